@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+/// Marks a function that also compiles for the device (CUDA). Empty on the host.
+#if defined(__CUDACC__)
+#define VIRGA_HD __host__ __device__
+#else
+#define VIRGA_HD
+#endif
