@@ -11,8 +11,8 @@
 
 namespace virga {
 
-/// What one pass writes: a beauty plane and a plane for each requested layer. Pixels are independent: different threads may
-/// set different pixels at once.
+/// What one pass writes: a beauty plane and a plane for each requested layer. Pixels are independent: different threads
+/// may set different pixels at once.
 class PassFrame {
  public:
   PassFrame(int width, int height, LayerMask layers);
@@ -27,14 +27,16 @@ class PassFrame {
   friend class Film;
   int width_, height_;
   LayerMask layers_;
-  std::vector<Image> planes_;  ///< [0] beauty, then the layers of the mask in the order of the enum
+  /// [0] beauty (empty where all layers are there), then the layers of the mask in the order of the enum
+  std::vector<Image> planes_;
 };
 
-/// The layered picture: for each plane the running mean (Welford) of R independent replicates, filled in turn. The spread
-/// *between replicates* is the picture's variance; passes within a replicate share a low-discrepancy sequence and say
-/// nothing about it.
+/// The layered picture: for each plane the running mean (Welford) of R independent replicates, filled in turn. The
+/// spread *between replicates* is the picture's variance; passes within a replicate share a low-discrepancy sequence
+/// and say nothing about it.
 ///
-/// Where all layers are stored, the beauty is their sum in the order of the enum, bit for bit, per replicate and in the mean.
+/// Where all layers are stored, the beauty is their sum in the order of the enum, bit for bit, per replicate and in the
+/// mean.
 class Film {
  public:
   static constexpr int kReplicates = 8;
@@ -45,17 +47,20 @@ class Film {
   int height() const;
   LayerMask layers() const;
 
-  /// The frame for the next pass to fill. Nothing counts until average() or replace().
+  /// The frame for the next pass to fill, every pixel of it: what a pass before has left is still in there. Nothing
+  /// counts until average() or replace(), so an aborted pass leaves no trace.
   PassFrame& frame() { return frame_; }
   /// The frame is one more sample of `replicate` in [0, kReplicates).
   void average(int replicate);
-  /// The frame is the whole picture now; what was averaged before is forgotten.
+  /// The frame is the whole picture now, as one pass of replicate 0; what was averaged before is forgotten.
   void replace();
   void clear();
 
   int64_t passes() const;  ///< averaged or replaced since the last clear()
   int64_t passesOf(int replicate) const;
-  uint64_t nonFiniteSamples() const;  ///< pixel values that were NaN or infinite when they came; they stay in the picture
+  /// Pixels that were NaN or infinite in any plane when they came, summed over the passes that are in the picture. They
+  /// stay in it: a mean with a NaN is NaN.
+  uint64_t nonFiniteSamples() const;
 
   Image beauty() const;
   Image layer(Layer) const;  ///< programmer error if the layer was not requested
@@ -66,12 +71,35 @@ class Film {
   bool hasVariance() const;
   Image beautyVariance() const;      ///< of the mean, per pixel and channel; programmer error without hasVariance()
   Image layerVariance(Layer) const;  ///< likewise
-  /// Expected relMSE of the beauty: mean over pixels and channels of variance / (mean^2 + 0.01).
+  /// Expected relMSE of the beauty: mean over pixels and channels of variance / (mean^2 + 0.01). Pixels that are not
+  /// finite are left out (nonFiniteSamples() tells of them); nothing without hasVariance() or without a finite pixel.
   std::optional<double> estimatedRelMse() const;
 
  private:
+  struct Replicate {
+    int64_t passes = 0;
+    std::vector<Image> planes;  ///< running means, as in PassFrame; allocated by the first pass
+  };
+  struct Weighted {
+    const Replicate* replicate;
+    double weight;
+  };
+
+  uint64_t countNonFinite(size_t begin, size_t end) const;
+  uint64_t mergeChunk(Replicate&, size_t begin, size_t end) const;
+  uint64_t merge(Replicate&);
+  bool storesBeauty() const;
+  size_t planeOf(Layer) const;
+  Image replicatePlane(int replicate, size_t plane) const;
+  Image planeMean(size_t plane) const;
+  std::vector<Weighted> weighted() const;
+  template <class Value>
+  Image varianceOf(const Value& value) const;
+
   PassFrame frame_;
-  // the rest is for the implementation to choose
+  std::array<Replicate, kReplicates> replicates_;
+  int64_t passes_ = 0;
+  uint64_t nonFinite_ = 0;
 };
 
 }  // namespace virga
