@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "core/sampler.h"
+#include "core/transform.h"
+#include "core/vec.h"
+
+namespace virga {
+
+/// Reconstruction filter, sampled (filter importance sampling): every sample has weight 1 and pixels stay independent.
+struct PixelFilter {
+  enum class Kind : uint8_t { box, tent, gaussian };
+  static constexpr int kTableSize = 256;
+
+  Kind kind = Kind::box;
+  float radius = 0.5f;                            ///< [pixels]
+  std::array<float, kTableSize + 1> inverseCdf{};  ///< gaussian: offset [pixels] at i / kTableSize
+
+  /// Offset from the pixel's centre [pixels].
+  VIRGA_HD Vec2 sample(Vec2 u) const { return {sample1D(u.x), sample1D(u.y)}; }
+
+ private:
+  VIRGA_HD float sample1D(float u) const {
+    if (kind == Kind::box) return (2 * u - 1) * radius;
+    if (kind == Kind::tent) return u < 0.5f ? radius * (std::sqrt(2 * u) - 1) : radius * (1 - std::sqrt(2 - 2 * u));
+    const float x = u * kTableSize;
+    const int i = static_cast<int>(x);
+    return lerp(inverseCdf[static_cast<size_t>(i)], inverseCdf[static_cast<size_t>(i + 1)], x - static_cast<float>(i));
+  }
+};
+
+struct CameraRay {
+  Ray ray;           ///< starts on the near plane
+  float tMax = 0;    ///< at the far plane
+};
+
+/// Pinhole camera that looks along +z of its own frame, +x to the left of the picture, +y up.
+struct PerspectiveCamera {
+  Affine toWorld;
+  float tanX = 1, tanY = 1;      ///< tangents of half the field of view
+  float shiftX = 0, shiftY = 0;  ///< principal point offset, in widths and heights of the whole film
+  float nearClip = 1e-2f, farClip = 1e4f;  ///< distances along the axis [unit]
+  int filmWidth = 1, filmHeight = 1;       ///< of the whole film [pixels]
+  int cropX = 0, cropY = 0, width = 1, height = 1;  ///< the part that is rendered [pixels]
+
+  /// (x, y) in pixels of the crop window, from its top left corner.
+  VIRGA_HD CameraRay ray(float x, float y) const {
+    const float sx = 1 - 2 * ((x + static_cast<float>(cropX)) / static_cast<float>(filmWidth) - shiftX);
+    const float sy = 1 - 2 * ((y + static_cast<float>(cropY)) / static_cast<float>(filmHeight) - shiftY);
+    const Vec3 local = normalize(Vec3(sx * tanX, sy * tanY, 1));
+    const Vec3 d = normalize(toWorld.vector(local));
+    const float inverseZ = 1 / local.z;
+    return {{toWorld.translation + d * (nearClip * inverseZ), d}, (farClip - nearClip) * inverseZ};
+  }
+};
+
+}  // namespace virga

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/distribution.h"
+#include "core/rgb.h"
+#include "core/transform.h"
+#include "core/warp.h"
+#include "scene/shape.h"
+
+namespace virga {
+
+/// A latitude-longitude picture around the scene: u = 0 at -z of its own frame, 0.25 at +x; v from +y down.
+struct EnvironmentView {
+  const Rgb* pixels = nullptr;
+  int width = 0, height = 0;
+  DiscreteView rows;          ///< marginal, over pixel rows
+  const float* columns = nullptr;  ///< conditional cumulative tables, width + 1 values a row
+  Affine toWorld, toLocal;    ///< rotations
+  float scale = 1;
+
+  /// Radiance from direction w (away from the scene) [W/(m^2 sr)], bilinear between pixel centres.
+  VIRGA_HD Rgb radiance(Vec3 w) const {
+    const Vec2 uv = toUv(toLocal.vector(w));
+    const float x = uv.x * static_cast<float>(width) - 0.5f;
+    const float y = clamp(uv.y * static_cast<float>(height) - 0.5f, 0, static_cast<float>(height - 1));
+    const float fx = x - std::floor(x), fy = y - std::floor(y);
+    const int x0 = (static_cast<int>(std::floor(x)) + width) % width, x1 = (x0 + 1) % width;
+    const int y0 = static_cast<int>(y), y1 = y0 + 1 < height ? y0 + 1 : y0;
+    const auto at = [&](int i, int j) { return pixels[static_cast<size_t>(j) * static_cast<size_t>(width) + static_cast<size_t>(i)]; };
+    const Rgb top = at(x0, y0) * (1 - fx) + at(x1, y0) * fx, bottom = at(x0, y1) * (1 - fx) + at(x1, y1) * fx;
+    return (top * (1 - fy) + bottom * fy) * scale;
+  }
+  struct Sample {
+    Vec3 w;
+    float pdf;  ///< [1/sr]
+  };
+  VIRGA_HD Sample sample(Vec2 u) const {
+    const auto row = rows.sample(u.y);
+    const auto column = rowTable(row.index).sample(u.x);
+    const float v = (static_cast<float>(row.index) + row.remapped) / static_cast<float>(height);
+    const float phi = kTwoPi * ((static_cast<float>(column.index) + column.remapped) / static_cast<float>(width));
+    const float sinTheta = std::sin(kPi * v);
+    const Vec3 local(std::sin(phi) * sinTheta, std::cos(kPi * v), -std::cos(phi) * sinTheta);
+    return {toWorld.vector(local), solidAngleDensity(row.probability * column.probability, sinTheta)};
+  }
+  VIRGA_HD float pdf(Vec3 w) const {
+    const Vec3 local = toLocal.vector(w);
+    const Vec2 uv = toUv(local);
+    const int i = clampIndex(uv.x, width), j = clampIndex(uv.y, height);
+    const float sinTheta = std::sqrt(std::fmax(0.f, local.x * local.x + local.z * local.z));
+    return solidAngleDensity(rows.probability(j) * rowTable(j).probability(i), sinTheta);
+  }
+
+ private:
+  VIRGA_HD static Vec2 toUv(Vec3 local) {
+    const float u = std::atan2(local.x, -local.z) * (0.5f * kInvPi);
+    return {u < 0 ? u + 1 : u, std::acos(clamp(local.y, -1, 1)) * kInvPi};
+  }
+  VIRGA_HD static int clampIndex(float unit, int count) {
+    const int i = static_cast<int>(unit * static_cast<float>(count));
+    return i < 0 ? 0 : (i >= count ? count - 1 : i);
+  }
+  VIRGA_HD DiscreteView rowTable(int row) const {
+    return {columns + static_cast<size_t>(row) * static_cast<size_t>(width + 1), width};
+  }
+  VIRGA_HD float solidAngleDensity(float pixelProbability, float sinTheta) const {
+    return sinTheta > 0 ? pixelProbability * static_cast<float>(width) * static_cast<float>(height) / (2 * kPi * kPi * sinTheta) : 0;
+  }
+};
+
+/// A light, in world coordinates.
+struct EmitterView {
+  enum class Kind : uint8_t { point, spot, directional, area, constant, environment };
+
+  Kind kind = Kind::point;
+  Rgb value;            ///< intensity [W/sr], irradiance across the beam [W/m^2] or radiance [W/(m^2 sr)]
+  Vec3 position;        ///< point, spot
+  Vec3 direction;       ///< spot, directional: unit, in which the light travels
+  float cutoffAngle = 0, beamWidth = 0;  ///< spot [rad]
+  int shape = -1;       ///< area: index of its surface
+  DiscreteView triangles;  ///< area, mesh: by area
+  float area = 0;       ///< area [unit^2]
+  EnvironmentView environment;
+
+  VIRGA_HD bool infinite() const {
+    return kind == Kind::directional || kind == Kind::constant || kind == Kind::environment;
+  }
+  /// Can only be met by sampling it: no ray hits it by chance.
+  VIRGA_HD bool isDelta() const { return kind == Kind::point || kind == Kind::spot || kind == Kind::directional; }
+  /// Has positions at a finite distance to aim at (equiangular sampling).
+  VIRGA_HD bool isLocal() const { return !infinite(); }
+
+  /// Radiant intensity toward unit direction w of a point or spot light [W/sr]. Spot: full within the beam width, linear in the
+  /// angle down to 0 at the cutoff.
+  VIRGA_HD Rgb intensity(Vec3 w) const {
+    if (kind == Kind::point) return value;
+    const float angle = std::acos(clamp(dot(direction, w), -1, 1));
+    if (angle >= cutoffAngle) return {};
+    return angle <= beamWidth ? value : value * ((cutoffAngle - angle) / (cutoffAngle - beamWidth));
+  }
+};
+
+/// A point on (or direction to) an emitter, as seen from a receiver.
+struct LightSample {
+  Vec3 wi;             ///< unit, from the receiver to the light
+  float distance = 0;  ///< [unit]; infinite for lights at infinity
+  Rgb radiance;        ///< toward the receiver; for delta lights the incident irradiance [W/m^2] across wi
+  float pdf = 0;       ///< [1/sr] of wi; 1 for delta lights; 0: no sample
+  bool delta = false;
+};
+
+/// A point on an emitter, chosen without regard to any receiver.
+struct LightPoint {
+  Vec3 p;
+  Vec3 normal;         ///< of an area light
+  float areaPdf = 0;   ///< [1/unit^2]; 1 for point-like lights; 0: no sample
+  bool pointLike = false;
+};
+
+VIRGA_HD inline LightPoint uniformPointOnShape(const ShapeView& shape, const EmitterView& emitter, Vec2 u) {
+  if (shape.kind == ShapeView::Kind::sphere) {
+    const Vec3 n = uniformSphere(u);
+    return {shape.center + n * shape.radius, n * shape.orientation, 1 / emitter.area, false};
+  }
+  if (shape.kind == ShapeView::Kind::disk) {
+    const Vec2 d = uniformDisk(u);
+    const Frame frame(shape.normal);
+    return {shape.center + (frame.s * d.x + frame.t * d.y) * shape.radius, shape.normal * shape.orientation,
+            1 / emitter.area, false};
+  }
+  const auto pick = emitter.triangles.sample(u.x);
+  const auto& triangle = shape.triangles[pick.index];
+  const Vec3 a = shape.positions[triangle[0]], b = shape.positions[triangle[1]], c = shape.positions[triangle[2]];
+  const Vec2 uv = uniformTriangle({pick.remapped, u.y});
+  return {a * (1 - uv.x - uv.y) + b * uv.x + c * uv.y, normalize(cross(b - a, c - a)) * shape.orientation,
+          1 / emitter.area, false};
+}
+
+/// 1 - cos of the half angle under which a sphere is seen from distance d > radius, without cancellation.
+VIRGA_HD inline float coneHeight(float radius, float d) {
+  const float s2 = square(radius / d);
+  return s2 / (1 + std::sqrt(std::fmax(0.f, 1 - s2)));
+}
+
+/// Density [1/sr] with which sampleLight picks the point `on` of an area emitter, seen from x; the point is known to face x.
+VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
+  if (shape.kind == ShapeView::Kind::sphere) {
+    const float d = distance(x, shape.center);
+    if (d > shape.radius * (1 + 1e-3f)) return 1 / (kTwoPi * coneHeight(shape.radius, d));
+  }
+  const Vec3 toLight = on - x;
+  const float d2 = lengthSquared(toLight);
+  const float cosLight = std::fabs(dot(normal, toLight)) / std::sqrt(d2);
+  return cosLight > 0 ? d2 / (cosLight * emitter.area) : 0;
+}
+
+/// Light of a point on an area emitter toward x; invalid (pdf 0) from behind.
+VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, const LightPoint& on) {
+  const Vec3 toLight = on.p - x;
+  const float d2 = lengthSquared(toLight);
+  if (!(d2 > 0)) return {};
+  const float d = std::sqrt(d2);
+  const Vec3 wi = toLight / d;
+  if (on.pointLike) return {wi, d, emitter.intensity(-wi) / d2, 1, true};
+  const float cosLight = -dot(on.normal, wi);
+  if (cosLight <= 0) return {};
+  return {wi, d, emitter.value, on.areaPdf * d2 / cosLight, false};
+}
+
+VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
+  const Vec3 toCenter = shape.center - x;
+  const float d = length(toCenter);
+  if (!(d > shape.radius * (1 + 1e-3f)) || shape.orientation < 0)
+    return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
+  const float height = coneHeight(shape.radius, d);
+  const Vec3 wi = Frame(toCenter / d).toWorld(uniformCone(u, height));
+  // Nearest hit of the ray with the sphere; a ray that grazes it by rounding takes the tangent point.
+  const float along = dot(wi, toCenter);
+  const float miss2 = lengthSquared(toCenter - wi * along);
+  const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
+  return {wi, along - half, emitter.value, 1 / (kTwoPi * height), false};
+}
+
+}  // namespace virga

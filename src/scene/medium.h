@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/rgb.h"
+#include "core/transform.h"
+#include "scattering/phase.h"
+#include "volume/grid_view.h"
+
+namespace virga {
+
+/// A participating medium: sigma_t(x) = sigmaT * density(x) [1/unit], the same for R, G and B; albedo may be coloured.
+struct MediumView {
+  float sigmaT = 0;  ///< [1/unit] at density 1
+  bool homogeneous = true;  ///< density is 1 everywhere
+  GridView density;
+  Affine worldToDensity;  ///< world to index coordinates of the density
+
+  Rgb albedo{0.75f, 0.75f, 0.75f};
+  RgbGridView albedoGrid;  ///< where it holds values they take the place of `albedo`
+  Affine worldToAlbedo;
+
+  PhaseFunction phase;
+
+  VIRGA_HD float sigmaTAt(Vec3 p) const {
+    return homogeneous ? sigmaT : sigmaT * density.lookup(worldToDensity.point(p));
+  }
+  VIRGA_HD Rgb albedoAt(Vec3 p) const {
+    return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo;
+  }
+};
+
+/// What a boundary says about the media on its two sides; indices into the scene's media, kNone is vacuum.
+struct MediumTransition {
+  static constexpr int kNone = -1;
+  int interior = kNone, exterior = kNone;
+  bool replaces = false;  ///< the declared side takes the place of all that was there; otherwise the interior is added
+
+  VIRGA_HD bool declared() const { return replaces || interior != kNone; }
+};
+
+/// Which media a point lies in. Two mechanisms (docs/scene-format.md): a boundary that *replaces* sets the base medium; closed
+/// null boundaries *add* their interior while the point is inside them. Applying a crossing twice changes nothing, so double
+/// hits on shared edges and coplanar faces do no harm.
+class MediaState {
+ public:
+  static constexpr int kCapacity = 8;
+  static constexpr int kNone = MediumTransition::kNone;
+
+  VIRGA_HD void setBase(int medium) { base_ = medium, exclusive_ = false; }
+  VIRGA_HD int base() const { return base_; }
+
+  /// Passing a boundary that replaces, to the side with this medium.
+  VIRGA_HD void replace(int medium) { base_ = medium, exclusive_ = medium != kNone; }
+  /// Entering additive boundary `boundary` whose interior is `medium`.
+  VIRGA_HD void enter(int boundary, int medium) {
+    for (int i = 0; i < count_; ++i)
+      if (inside_[i].boundary == boundary) return;
+    if (count_ < kCapacity)
+      inside_[count_++] = {static_cast<int16_t>(boundary), static_cast<int16_t>(medium)};
+    else
+      overflowed_ = true;
+  }
+  VIRGA_HD void leave(int boundary, int medium) {
+    for (int i = 0; i < count_; ++i)
+      if (inside_[i].boundary == boundary) {
+        inside_[i] = inside_[--count_];
+        break;
+      }
+    if (base_ == medium) replace(kNone);
+  }
+
+  /// Media whose coefficients add up here.
+  VIRGA_HD int count() const {
+    if (exclusive_) return 1;
+    return count_ + (baseCounts() ? 1 : 0);
+  }
+  VIRGA_HD int medium(int i) const {
+    if (exclusive_) return base_;
+    return i < count_ ? inside_[i].medium : base_;
+  }
+  VIRGA_HD bool vacuum() const { return count() == 0; }
+  VIRGA_HD bool overflowed() const { return overflowed_; }
+
+ private:
+  struct Inside {
+    int16_t boundary, medium;
+  };
+
+  // A base medium that is the interior of a boundary we are in was declared twice (a camera inside a cloud that names the
+  // cloud's medium): it counts once.
+  VIRGA_HD bool baseCounts() const {
+    if (base_ == kNone) return false;
+    for (int i = 0; i < count_; ++i)
+      if (inside_[i].medium == base_) return false;
+    return true;
+  }
+
+  int base_ = kNone;
+  bool exclusive_ = false, overflowed_ = false;
+  int count_ = 0;
+  Inside inside_[kCapacity];
+};
+
+}  // namespace virga
