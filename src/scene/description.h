@@ -24,19 +24,19 @@ using Value = std::variant<bool, int64_t, double, std::string, Vec3, Rgb, Matrix
 
 struct Property {
   std::string name;  ///< empty for an unnamed child
-  Value value;
-  SourcePosition position;       ///< of the name, or of the element
-  SourcePosition valuePosition;  ///< of the value's text
+  Value value{};
+  SourcePosition position{};       ///< of the name, or of the element
+  SourcePosition valuePosition{};  ///< of the value's text
 };
 
 /// One plugin instance: `<medium type="homogeneous" id="fog"> ... </medium>`.
 struct Node {
-  std::string tag;   ///< "scene", "medium", "shape", "bsdf", "emitter", "phase", "volume", "sensor", ...
-  std::string type;  ///< "homogeneous", ...; empty for the scene
-  std::string id;    ///< never empty and unique in its description; made up by the loader ("_medium_2") where none was given
-  std::vector<Property> properties;  ///< in the order of the file; a child object is a property that holds a NodePtr
-  SourcePosition position;           ///< of the element's name
-  SourcePosition typePosition;       ///< of the type's text
+  std::string tag;     ///< "scene", "medium", "shape", "bsdf", "emitter", "phase", "volume", "sensor", ...
+  std::string type{};  ///< "homogeneous", ...; empty for the scene
+  std::string id{};    ///< never empty, unique in its description; made up by the loader ("_medium_2") if not given
+  std::vector<Property> properties{};  ///< in the order of the file; a child object is a property that holds a NodePtr
+  SourcePosition position{};           ///< of the element's name
+  SourcePosition typePosition{};       ///< of the type's text
 
   bool hasGeneratedId() const { return id.starts_with('_'); }
 };

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/builder.h"
+
+#include <fmt/format.h>
+
+#include <system_error>
+
+#include "scene/build_context.h"
+
+namespace virga {
+namespace {
+
+template <class T>
+View<T> viewOf(const std::vector<T>& v) {
+  return {v.data(), static_cast<int>(v.size())};
+}
+
+void linkShapes(Scene& scene, Scene::Parts& parts) {
+  const auto rays = [](const std::vector<std::shared_ptr<const BuiltShape>>& shapes) {
+    std::vector<std::shared_ptr<const RayShape>> result;
+    for (const auto& s : shapes) result.push_back(s->rays);
+    return std::make_shared<const RayScene>(std::move(result));
+  };
+  scene.surfaceRays = rays(parts.surfaceShapes);
+  scene.boundaryRays = rays(parts.boundaryShapes);
+}
+
+void linkViews(Scene& scene, const Scene::Parts& parts) {
+  SceneView& view = scene.view;
+  view.surfaces = viewOf(parts.surfaces);
+  view.boundaries = viewOf(parts.boundaries);
+  view.bsdfs = viewOf(parts.bsdfs);
+  view.media = viewOf(parts.media);
+  view.emitters = viewOf(parts.emitters);
+  view.emitterChoice = parts.emitterChoice.view();
+}
+
+void measureBounds(Scene& scene, const Scene::Parts& parts) {
+  Bounds bounds;
+  for (const auto& s : parts.surfaceShapes) bounds.extend(s->bounds);
+  for (const auto& s : parts.boundaryShapes) bounds.extend(s->bounds);
+  if (bounds.empty()) bounds.extend(scene.camera.toWorld.translation);
+  scene.view.bounds = bounds;
+  scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
+}
+
+NodePtr onlyChild(PluginReader& reader, std::string_view tag) {
+  const std::vector<NodePtr> found = reader.children(tag);
+  if (found.size() > 1)
+    throw Error(fmt::format("the scene has {} {}s", found.size(), tag), {found[1]->position, "keep one of them", {}});
+  return found.empty() ? nullptr : found[0];
+}
+
+}  // namespace
+
+std::filesystem::path BuildContext::file(PluginReader& reader, std::string_view parameter) const {
+  const std::string name = reader.text(parameter, "");
+  if (name.empty()) reader.fail(parameter, fmt::format("\"{}\" is missing", parameter));
+  const std::filesystem::path path(name);
+  std::error_code ignored;
+  if (path.is_absolute() && std::filesystem::exists(path, ignored)) return path;
+  std::vector<std::string> tried;
+  if (!path.is_absolute())
+    for (const auto& directory : description.searchPaths) {
+      if (std::filesystem::exists(directory / path, ignored)) return directory / path;
+      tried.push_back("looked in " + directory.string());
+    }
+  reader.fail(parameter, fmt::format("file \"{}\" not found", name), "", tried);
+}
+
+void failUnknownType(const Node& node, std::span<const std::string_view> available, std::span<const std::string_view> notYet) {
+  std::vector<std::string> known(available.begin(), available.end());
+  std::sort(known.begin(), known.end());
+  const std::vector<std::string> notes{"available: " + joined(known)};
+  const SourcePosition position = node.typePosition.known() ? node.typePosition : node.position;
+  if (std::find(notYet.begin(), notYet.end(), node.type) != notYet.end())
+    throw Error(fmt::format("{} type \"{}\" is not supported yet", node.tag, node.type), {position, "", notes});
+  throw Error(fmt::format("unknown {} type \"{}\"", node.tag, node.type), {position, didYouMean(node.type, known), notes});
+}
+
+std::string parameterKey(const Node& node) {
+  Node bare{node.tag, node.type, "_", {}, {}, {}};
+  for (const Property& p : node.properties)
+    if (!std::holds_alternative<NodePtr>(p.value)) bare.properties.push_back(p);
+  return toXml({std::make_shared<const Node>(std::move(bare)), {}});
+}
+
+std::string fileKey(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const auto time = std::filesystem::last_write_time(path, ignored).time_since_epoch().count();
+  return fmt::format("{}@{}", path.string(), time);
+}
+
+SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions& options, const SceneSnapshot& previous) {
+  VIRGA_ASSERT(description.root);
+  auto scene = std::make_shared<Scene>();
+  auto parts = std::make_shared<Scene::Parts>();
+  scene->description = description;
+  BuildContext context{description, options, {.lenient = options.lenient, .warnings = {}}, *scene, *parts,
+                       previous ? &previous->parts->cache : nullptr, {}, {}};
+
+  PluginReader reader(*description.root, context.diagnostics);
+  if (const NodePtr integrator = onlyChild(reader, "integrator")) buildIntegrator(context, *integrator);
+  for (const NodePtr& shape : reader.children("shape")) buildShape(context, *shape);
+  for (const NodePtr& emitter : reader.children("emitter")) buildEmitter(context, *emitter);
+  // Definitions for others to refer to; checked even where nobody does.
+  for (const NodePtr& bsdf : reader.children("bsdf")) buildBsdf(context, *bsdf);
+  for (const NodePtr& medium : reader.children("medium")) buildMedium(context, *medium);
+  const NodePtr sensor = onlyChild(reader, "sensor");
+  if (!sensor) reader.fail("the scene has no sensor", "add a <sensor type=\"perspective\">");
+  buildSensor(context, *sensor);
+  reader.finish();
+
+  linkShapes(*scene, *parts);
+  measureBounds(*scene, *parts);
+  chooseEmittersByPower(context);
+  linkViews(*scene, *parts);
+  const int declared = scene->view.cameraMedia.base();
+  scene->view.cameraMedia = mediaAt(scene->view, *scene->boundaryRays, scene->camera.toWorld.translation);
+  scene->view.cameraMedia.setBase(declared);
+  scene->warnings = context.diagnostics.warnings;
+  scene->parts = std::move(parts);
+  return scene;
+}
+
+}  // namespace virga

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/distribution.h"
+#include "image/image.h"
+#include "scene/mesh.h"
+#include "scene/scene.h"
+#include "volume/grid.h"
+
+namespace virga {
+
+/// A shape of the scene file, in world space and ready to be traced; what it is made of and lit by is not its business.
+struct BuiltShape {
+  ShapeView view;  ///< geometry only
+  std::shared_ptr<const RayShape> rays;
+  Bounds bounds;
+  TriangleMesh mesh;       ///< world space; empty for spheres, disks and boxes
+  Discrete triangleChoice; ///< by area
+  float area = 0;          ///< [unit^2]
+  bool box = false;        ///< a cube as a boundary
+};
+
+/// An environment map with its sampling tables.
+struct BuiltEnvironment {
+  Image image;
+  Discrete rows;
+  std::vector<float> columns;
+  float meanRadiance = 0;  ///< over the sphere, mean of the channels, before the emitter's scale
+};
+
+/// Expensive objects by everything that went into them, so that the next snapshot finds them again.
+struct PartCache {
+  std::map<std::string, std::shared_ptr<const BuiltShape>> shapes;
+  std::map<std::string, std::shared_ptr<const Grid>> grids;
+  std::map<std::string, std::shared_ptr<const RgbGrid>> rgbGrids;
+  std::map<std::string, std::shared_ptr<const BuiltEnvironment>> environments;
+};
+
+struct Scene::Parts {
+  PartCache cache;
+  std::vector<std::shared_ptr<const BuiltShape>> surfaceShapes, boundaryShapes;
+  std::vector<ShapeView> surfaces;
+  std::vector<MediumTransition> boundaries;
+  std::vector<SurfaceBsdf> bsdfs;
+  std::vector<MediumView> media;
+  std::vector<EmitterView> emitters;
+  Discrete emitterChoice;
+};
+
+}  // namespace virga
