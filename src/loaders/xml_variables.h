@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "loaders/xml_argument.h"
+#include "loaders/xml_document.h"
+
+namespace virga {
+
+/// The `$variables` of a scene: given on the command line, or with `<default name="..." value="..."/>`.
+class Variables {
+ public:
+  explicit Variables(const std::map<std::string, std::string>& defines);
+
+  /// A default holds unless the variable has a value already: the command line wins, then the first default.
+  void addDefault(const std::string& name, const std::string& value, const SourcePosition& position);
+
+  /// The attribute's value with each `$name` replaced, by the longest name that fits. Throws Error at an unknown one.
+  Argument substituted(const xml::Attribute& attribute);
+
+  /// Throws Error for a value from the command line that no attribute used: it would change nothing.
+  void requireAllUsed() const;
+
+ private:
+  struct Variable {
+    std::string value;
+    std::string origin;  // for a note
+    bool isDefine = false;
+    bool used = false;
+  };
+
+  std::string longestName(std::string_view text) const;
+  [[noreturn]] void failUnknown(const SourcePosition& position, std::string_view text) const;
+
+  std::map<std::string, Variable> variables_;
+  std::vector<std::string> defaults_;
+};
+
+}  // namespace virga
