@@ -84,6 +84,9 @@ class Film {
     const Replicate* replicate;
     double weight;
   };
+  struct Moments {
+    double mean[3], variance[3];
+  };
 
   uint64_t countNonFinite(size_t begin, size_t end) const;
   uint64_t mergeChunk(Replicate&, size_t begin, size_t end) const;
@@ -93,6 +96,9 @@ class Film {
   Image replicatePlane(int replicate, size_t plane) const;
   Image planeMean(size_t plane) const;
   std::vector<Weighted> weighted() const;
+  template <class Value>
+  static Moments moments(const std::vector<Weighted>& filled, const Value& value);
+  static Rgb beautyAt(const Replicate&, size_t pixel);
   template <class Value>
   Image varianceOf(const Value& value) const;
 
