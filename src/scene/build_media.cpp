@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include "scene/build_context.h"
+#include "volume/volume_io.h"
+
+namespace virga {
+namespace {
+
+constexpr std::string_view kPhasesNotYet[] = {"rayleigh", "schlick", "tabphase", "blendphase"};
+
+PhaseFunction buildPhase(BuildContext& context, const NodePtr& node) {
+  if (!node) return PhaseFunction(Isotropic{});
+  using Build = PhaseFunction (*)(PluginReader&);
+  static constexpr auto meanCosine = [](PluginReader& r) {
+    return r.number("g", 0.8f, {.lo = -1, .hi = 1, .openLo = true, .openHi = true});
+  };
+  static constexpr PluginRow<Build> kPhases[] = {
+      {"isotropic", [](PluginReader&) { return PhaseFunction(Isotropic{}); }},
+      {"hg", [](PluginReader& r) { return PhaseFunction(HenyeyGreenstein{meanCosine(r)}); }},
+      {"cornette_shanks", [](PluginReader& r) { return PhaseFunction(CornetteShanks{meanCosine(r)}); }}};
+  PluginReader reader(*node, context.diagnostics);
+  const PhaseFunction phase = findPlugin(*node, kPhases, kPhasesNotYet)(reader);
+  reader.finish();
+  return phase;
+}
+
+/// A volume plugin's grid and where it stands; exactly one of the pointers, or a constant.
+struct VolumeField {
+  Rgb constant;
+  std::shared_ptr<const Grid> grid;
+  std::shared_ptr<const RgbGrid> rgbGrid;
+  Matrix4 indexToWorld;
+};
+
+enum class VolumeUse { density, albedo };
+
+Matrix4 unitCubeToBounds(const Bounds& b) {
+  const Vec3 e = b.extent();
+  return Matrix4::translation(b.lo.x, b.lo.y, b.lo.z) * Matrix4::scaling(e.x, e.y, e.z);
+}
+
+/// Index coordinates of nx x ny x nz voxels to the unit cube: centres at (i + 0.5) / n.
+Matrix4 voxelsToUnitCube(int nx, int ny, int nz) {
+  return Matrix4::scaling(1.0 / nx, 1.0 / ny, 1.0 / nz) * Matrix4::translation(0.5, 0.5, 0.5);
+}
+
+// Errors about a file's content gain the place in the scene that named the file.
+template <class Load>
+auto loadedFrom(PluginReader& reader, std::string_view parameter, const Load& load) {
+  try {
+    return load();
+  } catch (const Error& error) {
+    throw error.at(reader.positionOf(parameter));
+  }
+}
+
+VolumeField buildConstantVolume(BuildContext&, PluginReader& reader, VolumeUse) {
+  reader.ignore("to_world");
+  return {reader.color("value", Rgb(1.f)), nullptr, nullptr, {}};
+}
+
+void refuseOtherSampling(PluginReader& reader) {
+  static constexpr std::string_view kFilters[] = {"trilinear"}, kWraps[] = {"clamp"};
+  reader.oneOf("filter_type", "trilinear", kFilters);
+  reader.oneOf("wrap_mode", "clamp", kWraps);
+  reader.ignore("raw");
+  reader.ignore("accel");
+}
+
+VolumeField buildGridVolume(BuildContext& context, PluginReader& reader, VolumeUse use) {
+  const std::filesystem::path path = context.file(reader, "filename");
+  refuseOtherSampling(reader);
+  VolumeField field;
+  field.indexToWorld = reader.transform("to_world");
+  if (reader.boolean("use_grid_bbox", false))
+    field.indexToWorld = field.indexToWorld *
+                         unitCubeToBounds(loadedFrom(reader, "filename", [&] { return volBounds(path); }));
+  const std::string key = fileKey(path);
+  loadedFrom(reader, "filename", [&] {
+    if (use == VolumeUse::density) {
+      field.grid = context.cached<Grid>(&PartCache::grids, key, [&] { return loadVolume(path); });
+      field.indexToWorld = field.indexToWorld * field.grid->indexToWorld();
+    } else {
+      field.rgbGrid = context.cached<RgbGrid>(&PartCache::rgbGrids, key, [&]() -> std::shared_ptr<const RgbGrid> {
+        return std::make_shared<const RgbGrid>(loadRgbVolume(path));
+      });
+      const RgbGridView v = field.rgbGrid->view();
+      field.indexToWorld = field.indexToWorld * voxelsToUnitCube(v.nx, v.ny, v.nz);
+    }
+  });
+  return field;
+}
+
+VolumeField buildVdb(BuildContext& context, PluginReader& reader, VolumeUse use) {
+  if (use == VolumeUse::albedo) reader.fail("a vdb volume for \"albedo\" is not supported yet", "use a gridvolume");
+  const std::filesystem::path path = context.file(reader, "filename");
+  const std::string grid = reader.text("grid", "");
+  VolumeField field;
+  field.grid = loadedFrom(reader, reader.has("grid") ? "grid" : "filename", [&] {
+    return context.cached<Grid>(&PartCache::grids, fileKey(path) + "#" + grid, [&] { return loadVolume(path, {grid}); });
+  });
+  field.indexToWorld = reader.transform("to_world") * field.grid->indexToWorld();
+  return field;
+}
+
+VolumeField buildVolume(BuildContext& context, const Node& node, VolumeUse use) {
+  using Build = VolumeField (*)(BuildContext&, PluginReader&, VolumeUse);
+  static constexpr PluginRow<Build> kVolumes[] = {
+      {"constvolume", buildConstantVolume}, {"gridvolume", buildGridVolume}, {"vdb", buildVdb}};
+  const Build build = findPlugin(node, kVolumes, {});
+  PluginReader reader(node, context.diagnostics);
+  const VolumeField field = build(context, reader, use);
+  reader.finish();
+  return field;
+}
+
+float greySigmaT(PluginReader& reader, std::string_view parameter, Rgb value) {
+  if (!isGrey(value))
+    reader.fail(parameter, fmt::format("\"{}\" differs between the channels; chromatic extinction is not supported yet", parameter),
+                "give one value");
+  return value.r;
+}
+
+// Mitsuba 0.x names both coefficients; 3 names their sum and the albedo.
+void readScatteringAndAbsorption(PluginReader& reader, MediumView& medium) {
+  const Rgb sigmaS = reader.color("sigma_s", Rgb(0.f)), sigmaA = reader.color("sigma_a", Rgb(0.f)), sum = sigmaS + sigmaA;
+  medium.sigmaT = greySigmaT(reader, "sigma_s", sum);
+  medium.albedo = medium.sigmaT > 0 ? sigmaS / sum : Rgb(0.f);
+}
+
+void readAlbedo(BuildContext& context, PluginReader& reader, MediumView& medium) {
+  if (const NodePtr volume = reader.child("volume", "albedo")) {
+    const VolumeField field = buildVolume(context, *volume, VolumeUse::albedo);
+    if (field.rgbGrid) {
+      if (field.rgbGrid->maximum() > 1) reader.fail("albedo", fmt::format("albedo reaches {}; it must be at most 1", field.rgbGrid->maximum()));
+      medium.albedoGrid = field.rgbGrid->view();
+      medium.worldToAlbedo = Affine(field.indexToWorld.inverse());
+    } else {
+      if (maxComponent(field.constant) > 1) reader.fail("albedo", fmt::format("albedo is {}; it must be at most 1", maxComponent(field.constant)));
+      medium.albedo = field.constant;
+    }
+    return;
+  }
+  medium.albedo = reader.color("albedo", Rgb(0.75f), reader.unit());
+}
+
+void makeHomogeneous(MediumView& medium, float sigmaT) {
+  medium.homogeneous = true;
+  medium.sigmaT = sigmaT;
+}
+
+// sigma_t of a medium: a number, or a volume.
+void readSigmaT(BuildContext& context, PluginReader& reader, MediumView& medium) {
+  const NodePtr volume = reader.child("volume", "sigma_t");
+  if (!volume) return makeHomogeneous(medium, greySigmaT(reader, "sigma_t", reader.color("sigma_t", Rgb(1.f))));
+  const VolumeField field = buildVolume(context, *volume, VolumeUse::density);
+  if (!field.grid) return makeHomogeneous(medium, greySigmaT(reader, "sigma_t", field.constant));
+  medium.homogeneous = false;
+  medium.sigmaT = 1;
+  medium.density = field.grid->view();
+  medium.worldToDensity = Affine(field.indexToWorld.inverse());
+}
+
+MediumView readMedium(BuildContext& context, PluginReader& reader) {
+  MediumView medium;
+  if (reader.has("sigma_s") || reader.has("sigma_a")) {
+    if (reader.has("sigma_t") || reader.has("albedo"))
+      reader.fail("sigma_t", "give either \"sigma_t\" and \"albedo\" or \"sigma_s\" and \"sigma_a\"");
+    readScatteringAndAbsorption(reader, medium);
+  } else {
+    readAlbedo(context, reader, medium);
+    readSigmaT(context, reader, medium);
+  }
+  medium.sigmaT *= reader.number("scale", 1, reader.nonNegative());
+  if (!std::isfinite(medium.sigmaT)) reader.fail("scale", "\"scale\" times \"sigma_t\" is too large");
+  medium.phase = buildPhase(context, reader.child("phase"));
+  reader.ignore("sample_emitters");
+  reader.ignore("has_spectral_extinction");
+  reader.ignore("majorant_resolution_factor");
+  return medium;
+}
+
+MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
+  const MediumView medium = readMedium(context, reader);
+  if (!medium.homogeneous || medium.albedoGrid.values)
+    reader.fail("a homogeneous medium cannot have a grid", "use type=\"heterogeneous\"");
+  return medium;
+}
+
+}  // namespace
+
+int buildMedium(BuildContext& context, const Node& node) {
+  if (const auto known = context.mediumIndex.find(&node); known != context.mediumIndex.end()) return known->second;
+  using Build = MediumView (*)(BuildContext&, PluginReader&);
+  static constexpr PluginRow<Build> kMedia[] = {{"homogeneous", buildHomogeneous}, {"heterogeneous", readMedium}};
+  const Build build = findPlugin(node, kMedia, {});
+  PluginReader reader(node, context.diagnostics);
+  const MediumView medium = build(context, reader);
+  reader.finish();
+  const int index = static_cast<int>(context.parts.media.size());
+  context.parts.media.push_back(medium);
+  context.mediumIndex[&node] = index;
+  return index;
+}
+
+}  // namespace virga

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/scene.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "core/random.h"
+
+namespace virga {
+namespace {
+
+using NodesById = std::map<std::string, NodePtr>;
+
+void collect(const NodePtr& node, NodesById& nodes) {
+  if (!nodes.emplace(node->id, node).second) return;
+  for (const Property& p : node->properties)
+    if (const NodePtr* child = std::get_if<NodePtr>(&p.value)) collect(*child, nodes);
+}
+
+bool sameValue(const Value& a, const Value& b) {
+  if (a.index() != b.index()) return false;
+  if (const NodePtr* x = std::get_if<NodePtr>(&a)) return (*x)->id == std::get<NodePtr>(b)->id;
+  return a == b;
+}
+
+// Names of the parameters that one node has and the other has not, or has differently; children by their ids.
+std::set<std::string> changedParameters(const Node& a, const Node& b) {
+  std::set<std::string> changed;
+  const auto compare = [&](const Node& from, const Node& to) {
+    for (const Property& p : from.properties)
+      if (std::none_of(to.properties.begin(), to.properties.end(),
+                       [&](const Property& q) { return q.name == p.name && sameValue(p.value, q.value); }))
+        changed.insert(p.name);
+  };
+  compare(a, b);
+  compare(b, a);
+  if (a.type != b.type) changed.insert("");
+  return changed;
+}
+
+bool isPose(std::string_view parameter) {
+  return parameter == "to_world" || parameter == "position" || parameter == "direction" || parameter == "center" ||
+         parameter == "radius";
+}
+
+Aspect aspectOf(std::string_view tag, std::string_view parameter) {
+  if (tag == "sensor") return Aspect::camera;
+  if (tag == "film" || tag == "rfilter") return Aspect::film;
+  if (tag == "emitter") return isPose(parameter) ? Aspect::emitterPose : Aspect::emitterIntensity;
+  if (tag == "volume") return isPose(parameter) ? Aspect::mediumPose : Aspect::mediumGrid;
+  if (tag == "medium" || tag == "phase") return Aspect::mediumParameters;
+  if (tag == "shape") return isPose(parameter) ? Aspect::shapePose : Aspect::shapeTopology;
+  if (tag == "bsdf" || tag == "texture") return Aspect::material;
+  return Aspect::setting;
+}
+
+Aspect aspectOfPresence(std::string_view tag) { return tag == "emitter" ? Aspect::emitterSet : aspectOf(tag, ""); }
+
+}  // namespace
+
+bool ChangeSet::touches(Aspect aspect) const {
+  return std::any_of(changes.begin(), changes.end(), [&](const Change& c) { return c.aspect == aspect; });
+}
+
+ChangeSet differences(const SceneDescription& before, const SceneDescription& after) {
+  NodesById a, b;
+  collect(before.root, a);
+  collect(after.root, b);
+  ChangeSet set;
+  const auto add = [&](const std::string& id, Aspect aspect) {
+    const Change change{id, aspect};
+    if (std::find(set.changes.begin(), set.changes.end(), change) == set.changes.end()) set.changes.push_back(change);
+  };
+  for (const auto& [id, node] : a) {
+    const auto other = b.find(id);
+    if (other == b.end() || other->second->tag != node->tag) {
+      add(id, aspectOfPresence(node->tag));
+    } else if (node != other->second && node->tag != "scene") {
+      for (const std::string& parameter : changedParameters(*node, *other->second)) add(id, aspectOf(node->tag, parameter));
+    }
+  }
+  for (const auto& [id, node] : b)
+    if (!a.contains(id)) add(id, aspectOfPresence(node->tag));
+  return set;
+}
+
+MediaState mediaAt(const SceneView& scene, const RayScene& boundaries, Vec3 p) {
+  MediaState state;
+  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside.
+  const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
+  std::set<uint32_t> seen;
+  bool baseKnown = false;
+  float from = 0;
+  for (CrossingList list;; from = list.items[CrossingList::kCapacity - 1].t, list = {}) {
+    boundaries.crossings(ray, from, kInfinity, list);
+    for (const Crossing& c : list.crossings()) {
+      if (!seen.insert(c.shape).second) continue;
+      const MediumTransition& media = scene.boundaries[c.shape];
+      if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
+      if (media.replaces && !baseKnown) {
+        baseKnown = true;
+        state.replace(c.entering ? media.exterior : media.interior);
+      }
+    }
+    if (list.complete) return state;
+  }
+}
+
+uint64_t contentHash(const SceneDescription& description) {
+  uint64_t h = 0;
+  for (const char c : toXml(description)) h = hash64(h ^ static_cast<unsigned char>(c));
+  return h;
+}
+
+}  // namespace virga
