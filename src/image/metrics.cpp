@@ -106,7 +106,7 @@ double incompleteBeta(double a, double b, double x) {
 // few bins of all tests, so that the tail of Student's law is evaluated once a bin and not once a pixel.
 struct Bin {
   int64_t tests = 0, beyond2 = 0, beyond3 = 0;
-  double sumT2 = 0, maxT = 0;
+  double chiSquared = 0, maxT = 0;
 };
 
 constexpr size_t kMaxDegrees =
@@ -150,7 +150,7 @@ class Gatherer {
     ++bin.tests;
     bin.beyond2 += t > 2 ? 1 : 0;
     bin.beyond3 += t > 3 ? 1 : 0;
-    bin.sumT2 += t * t;
+    if (n > 2) bin.chiSquared += t * t * (known - 2) / known;
     bin.maxT = std::max(bin.maxT, t);
   }
 
@@ -164,7 +164,7 @@ void addInto(Bins& total, const Bins& part) {
     Bin& t = total.bin[n];
     const Bin& p = part.bin[n];
     t.tests += p.tests, t.beyond2 += p.beyond2, t.beyond3 += p.beyond3;
-    t.sumT2 += p.sumT2;
+    t.chiSquared += p.chiSquared;
     t.maxT = std::max(t.maxT, p.maxT);
   }
   total.certain += part.certain, total.nonFinite += part.nonFinite;
@@ -182,7 +182,7 @@ Agreement summary(const Bins& bins) {
     out.beyond2 += static_cast<double>(bin.beyond2), out.beyond3 += static_cast<double>(bin.beyond3);
     out.expectedBeyond2 += tests * studentTwoSided(2, degrees);
     out.expectedBeyond3 += tests * studentTwoSided(3, degrees);
-    if (n > 2) chiSquared += bin.sumT2 * (degrees - 2) / degrees, chiTests += tests;
+    if (n > 2) chiSquared += bin.chiSquared, chiTests += tests;
     out.maximumT = std::max(out.maximumT, bin.maxT);
     smallestP = std::min(smallestP, studentTwoSided(bin.maxT, degrees));
   }

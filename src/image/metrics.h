@@ -32,8 +32,8 @@ struct Uncertainty {
 };
 
 /// Do two pictures agree within their noise? Per pixel and channel, Welch's t = (a - b) / sqrt(va + vb), with
-/// (va + vb)^2 / (va^2 / (ra - 1) + vb^2 / (rb - 1)) degrees of freedom, rounded down. Under "both have the same
-/// expectation, replicates are normal" the expected values below hold.
+/// (va + vb)^2 / (va^2 / (ra - 1) + vb^2 / (rb - 1)) degrees of freedom, rounded down for p-values. Under "both have
+/// the same expectation, replicates are normal" the expected values below hold.
 ///
 /// Replicates of few samples are skewed, not normal: then the tails are heavier, and a small maximumP says less than an
 /// excess of chiSquaredPerDof over many pixels. Channels of a pixel, and pixels that share light paths, correlate:
@@ -44,12 +44,14 @@ struct Agreement {
   double beyond3 = 0;  ///< fraction of |t| > 3
   double expectedBeyond2 =
       0;  ///< what to expect of beyond2: more than the normal law's 4.55 %, as variances are estimates
-  double expectedBeyond3 = 0;   ///< likewise
-  double chiSquaredPerDof = 0;  ///< mean of t^2 (n - 2) / n, n the degrees of freedom (those with n > 2): expected 1
-  double maximumT = 0;          ///< largest |t|
-  double maximumP = 1;          ///< p-value of the most unlikely t among all tests (Sidak)
-  int64_t certain = 0;          ///< values without variance on either side that differ
-  int64_t nonFinite = 0;        ///< values left out: a, b or a variance is not finite
+  double expectedBeyond3 = 0;  ///< likewise
+  /// Mean of t^2 (n - 2) / n, n the degrees of freedom, over the tests with n of 3 or more. Expected 1, or up to 3 %
+  /// below: n is an estimate itself. NaN without such tests.
+  double chiSquaredPerDof = 0;
+  double maximumT = 0;    ///< largest |t|
+  double maximumP = 1;    ///< p-value of the most unlikely t among all tests (Sidak)
+  int64_t certain = 0;    ///< values without variance on either side that differ
+  int64_t nonFinite = 0;  ///< values left out: a, b or a variance is not finite
 };
 
 /// Differences below 1e-6 of the value count as none: two means of one value differ by rounding. Throws Error if the
