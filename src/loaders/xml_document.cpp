@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <pugixml.hpp>
 
 #include "loaders/error_at.h"
+#include "scene/read_file.h"
 
 namespace virga::xml {
 namespace {
@@ -105,8 +105,8 @@ class Converter {
 void requireText(const std::shared_ptr<const SourceFile>& file) {
   const std::string& text = file->text;
   const size_t start = text.find_first_not_of(kBlanks);
-  if (start == std::string::npos) throw Error(fmt::format("{}: the file is empty", file->name));
-  if (text.find('\0') != std::string::npos) throw Error(fmt::format("{}: this is a binary file, not XML", file->name));
+  if (start == std::string::npos) throw Error(fmt::format("cannot read \"{}\": the file is empty", file->name));
+  if (text.find('\0') != std::string::npos) throw Error(fmt::format("cannot read \"{}\": this is a binary file, not XML", file->name));
   if (text[start] != '<')
     throw errorAt({file, start, 1}, "this is not XML", "a scene starts with <scene version=\"3.0.0\">");
 }
@@ -114,21 +114,7 @@ void requireText(const std::shared_ptr<const SourceFile>& file) {
 }  // namespace
 
 std::shared_ptr<const SourceFile> readFile(const std::filesystem::path& file) {
-  const auto fail = [&](std::string_view why) -> Error { return Error(fmt::format("{}: {}", file.string(), why)); };
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (status.type() == std::filesystem::file_type::not_found) throw fail("no such file");
-  if (error) throw fail(error.message());
-  if (std::filesystem::is_directory(status)) throw fail("this is a folder, not a file");
-  if (!std::filesystem::is_regular_file(status)) throw fail("this is not a regular file");
-  const uintmax_t size = std::filesystem::file_size(file, error);
-  if (error) throw fail(error.message());
-  if (size > kMaxFileBytes) throw fail("larger than 1 GiB, which is no scene");
-
-  std::string text(static_cast<size_t>(size), '\0');
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream.read(text.data(), static_cast<std::streamsize>(size))) throw fail("the file cannot be read");
-  return std::make_shared<const SourceFile>(SourceFile{file.string(), std::move(text)});
+  return virga::readFile(file, kMaxFileBytes);
 }
 
 Element parse(const std::shared_ptr<const SourceFile>& given) {
