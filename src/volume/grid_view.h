@@ -54,21 +54,36 @@ struct RgbGridView {
 struct SparseGridView {
   const nanovdb::FloatGrid* grid = nullptr;
 
-  /// Trilinear; what the tree does not store is its background.
+  /// Trilinear; what the tree does not store is its background. |p| stays below 2^31 (a Grid's support does).
   VIRGA_HD float lookup(Vec3 p) const {
     const float bx = std::floor(p.x), by = std::floor(p.y), bz = std::floor(p.z);
     const float fx = p.x - bx, fy = p.y - by, fz = p.z - bz;
     const nanovdb::Coord c(static_cast<int>(bx), static_cast<int>(by), static_cast<int>(bz));
     auto accessor = grid->getAccessor();
+    if (((c.x() + 1) & 7) != 0 && ((c.y() + 1) & 7) != 0 && ((c.z() + 1) & 7) != 0) {
+      // The stencil lies within one block of 8^3: a leaf, or a part of a tile, which is constant.
+      const auto* leaf = accessor.probeLeaf(c);
+      return leaf ? lookup(leaf->data()->mValues, c, fx, fy, fz) : accessor.getValue(c);
+    }
     const auto at = [&](int dx, int dy, int dz) { return accessor.getValue(c.offsetBy(dx, dy, dz)); };
     const float c00 = lerp(at(0, 0, 0), at(1, 0, 0), fx), c10 = lerp(at(0, 1, 0), at(1, 1, 0), fx);
     const float c11 = lerp(at(0, 1, 1), at(1, 1, 1), fx), c01 = lerp(at(0, 0, 1), at(1, 0, 1), fx);
     return lerp(lerp(c00, c10, fy), lerp(c01, c11, fy), fz);
   }
+
+ private:
+  /// The stencil at `c` within the values of a leaf (z fastest).
+  VIRGA_HD static float lookup(const float* values, nanovdb::Coord c, float fx, float fy, float fz) {
+    const float* v = values + ((c.x() & 7) * 64 + (c.y() & 7) * 8 + (c.z() & 7));
+    const float c00 = lerp(v[0], v[64], fx), c10 = lerp(v[8], v[72], fx);
+    const float c01 = lerp(v[1], v[65], fx), c11 = lerp(v[9], v[73], fx);
+    return lerp(lerp(c00, c10, fy), lerp(c01, c11, fy), fz);
+  }
 };
 
 /// A box of coarse cells over a fine grid's support, each with one number: the maximum (majorants) or the mean of what the
-/// trilinear interpolant takes inside the cell.
+/// trilinear interpolant takes in the part of the cell that lies in the support. The first cell starts where the support
+/// does; the last ones may reach beyond it.
 struct CoarseGridView {
   const float* values = nullptr;  ///< x fastest
   int nx = 0, ny = 0, nz = 0;

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "volume/vdb_file.h"
+
+// The only file that sees OpenVDB: its headers take half a minute to compile.
+#define NANOVDB_USE_ZIP
+#include <fmt/format.h>
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
+#include <openvdb/util/logging.h>
+
+#include <istream>
+#include <mutex>
+#include <streambuf>
+
+#include "volume/grid_factory.h"
+#include "volume/grid_listing.h"
+
+namespace virga {
+namespace {
+
+constexpr int64_t kMagic = 0x56444220;
+constexpr uint32_t kOldestVersion = 220;
+
+void initialiseOnce() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    openvdb::logging::setLevel(openvdb::logging::Level::Fatal);
+    openvdb::initialize();
+  });
+}
+
+class MemoryBuffer : public std::streambuf {
+ public:
+  MemoryBuffer(const std::byte* bytes, size_t size) {
+    char* begin = const_cast<char*>(reinterpret_cast<const char*>(bytes));  // streambuf wants it so; nothing writes
+    setg(begin, begin, begin + size);
+  }
+
+ private:
+  pos_type seekoff(off_type offset, std::ios::seekdir from, std::ios::openmode) override {
+    const off_type base = from == std::ios::beg ? 0 : from == std::ios::cur ? gptr() - eback() : egptr() - eback();
+    if (offset < -base || offset > egptr() - eback() - base) return pos_type(off_type(-1));
+    setg(eback(), eback() + base + offset, egptr());
+    return base + offset;
+  }
+  pos_type seekpos(pos_type position, std::ios::openmode which) override {
+    return seekoff(off_type(position), std::ios::beg, which);
+  }
+};
+
+// Bytes as a stream that throws where they end. OpenVDB itself does not look whether a read succeeded: on a plain
+// stream it would go on with what its variables held.
+class MemoryStream : private MemoryBuffer, public std::istream {
+ public:
+  MemoryStream(const std::byte* bytes, size_t size)
+      : MemoryBuffer(bytes, size), std::istream(static_cast<MemoryBuffer*>(this)) {
+    exceptions(std::ios::failbit | std::ios::badbit);
+  }
+};
+
+struct Entry {
+  std::string name, type;  // "Tree_float_5_4_3", with "_HalfFloat" where it is stored so
+  size_t descriptorAt = 0;
+  std::string uniqueName, parent;  // in OpenVDB's spelling; an instance shares its parent's tree
+};
+
+// Reads the table of contents by itself, because OpenVDB believes every length that it finds there.
+class ContentsReader {
+ public:
+  explicit ContentsReader(const AlignedBytes& bytes) : bytes_(bytes), in_(bytes.data(), bytes.size()) { header(); }
+
+  uint32_t version() const { return version_; }
+  bool hasOffsets() const { return hasOffsets_; }
+
+  std::vector<Entry> entries() {
+    metadata(in_);
+    const auto count = in_.read<int32_t>();
+    std::vector<Entry> entries;
+    for (int32_t i = 0; i < count; ++i) {
+      entries.push_back(descriptor());
+      if (!hasOffsets_ && count > 1)
+        throw Error("holds several grids without a table of contents; rewrite it as a seekable file");
+      if (hasOffsets_) in_ = ByteReader(bytes_.data(), bytes_.size(), static_cast<size_t>(end_));
+    }
+    return entries;
+  }
+
+ private:
+  void header() {
+    if (in_.read<int64_t>() != kMagic) throw Error("is not a VDB file");
+    version_ = in_.read<uint32_t>();
+    if (version_ < kOldestVersion || version_ > openvdb::OPENVDB_FILE_VERSION)
+      throw Error(fmt::format("has VDB file version {}; known are {} to {}", version_, kOldestVersion,
+                              static_cast<int>(openvdb::OPENVDB_FILE_VERSION)));
+    in_.take(2 * sizeof(uint32_t));  // version of the library
+    hasOffsets_ = in_.read<char>() != 0;
+    if (version_ < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) in_.take(1);
+    in_.take(36);  // UUID
+  }
+
+  static std::string text(ByteReader& in) { return in.text(in.read<uint32_t>()); }
+
+  static void metadata(ByteReader& in) {
+    const auto count = in.read<uint32_t>();
+    for (uint32_t i = 0; i < count; ++i) {
+      text(in), text(in);
+      in.take(in.read<uint32_t>());
+    }
+  }
+
+  Entry descriptor() {
+    Entry entry;
+    entry.descriptorAt = in_.offset();
+    entry.uniqueName = text(in_);
+    entry.name = openvdb::io::GridDescriptor::stripSuffix(entry.uniqueName);
+    entry.type = text(in_);
+    entry.parent = text(in_);
+    const auto gridAt = in_.read<int64_t>();
+    in_.read<int64_t>();
+    end_ = in_.read<int64_t>();
+    ByteReader grid = hasOffsets_ ? ByteReader(bytes_.data(), bytes_.size(), static_cast<size_t>(gridAt)) : in_;
+    if (hasOffsets_ && end_ < static_cast<int64_t>(in_.offset())) throw Error("file is truncated or damaged");
+    checkGrid(grid);
+    return entry;
+  }
+
+  // The lengths at the start of a grid's own data.
+  void checkGrid(ByteReader& grid) const {
+    if (version_ >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) grid.take(sizeof(uint32_t));
+    metadata(grid);
+    text(grid);  // name of the transform's type
+  }
+
+  const AlignedBytes& bytes_;
+  ByteReader in_;
+  uint32_t version_ = 0;
+  bool hasOffsets_ = false;
+  int64_t end_ = 0;
+};
+
+class VdbReader : private openvdb::io::Archive {
+ public:
+  explicit VdbReader(const AlignedBytes& bytes) : stream_(bytes.data(), bytes.size()) {
+    initialiseOnce();
+    ContentsReader contents(bytes);
+    entries_ = contents.entries();
+    hasOffsets_ = contents.hasOffsets();
+    version_ = contents.version();
+    openvdb::io::setStreamMetadataPtr(stream_, metadata_, /*transfer=*/false);
+    readHeader(stream_);
+    setFormatVersion(stream_);
+    setLibraryVersion(stream_);
+    setDataCompression(stream_);
+  }
+
+  uint32_t version() const { return version_; }
+  const std::vector<Entry>& entries() const { return entries_; }
+
+  openvdb::GridBase::Ptr read(const Entry& entry) {
+    openvdb::io::GridDescriptor descriptor;
+    stream_.seekg(static_cast<std::streamoff>(entry.descriptorAt));
+    openvdb::GridBase::Ptr grid = descriptor.read(stream_);
+    if (hasOffsets_) descriptor.seekToGrid(stream_);
+    readGrid(grid, descriptor, stream_);
+    if (!entry.parent.empty()) grid->setTree(read(parentOf(entry))->baseTreePtr());
+    return grid;
+  }
+
+ private:
+  const Entry& parentOf(const Entry& entry) const {
+    for (const Entry& other : entries_)
+      if (other.uniqueName == entry.parent && other.parent.empty()) return other;
+    throw Error("file is truncated or damaged");
+  }
+
+  openvdb::SharedPtr<openvdb::io::StreamMetadata> metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
+  MemoryStream stream_;  // refers to metadata_
+  std::vector<Entry> entries_;
+  bool hasOffsets_ = false;
+  uint32_t version_ = 0;
+};
+
+std::vector<std::string> namesOf(const std::vector<Entry>& entries) {
+  std::vector<std::string> names;
+  for (const Entry& entry : entries) names.push_back(entry.name);
+  return uniqueNames(names);
+}
+
+// "float" from "Tree_float_5_4_3".
+std::string valueType(const Entry& entry) {
+  std::string type = entry.type;
+  const bool half = type.ends_with("_HalfFloat");
+  if (half) type.resize(type.size() - std::string("_HalfFloat").size());
+  if (type.starts_with("Tree_")) type = type.substr(5, type.find('_', 5) - 5);
+  return half && type == "float" ? "half" : type;
+}
+
+bool isScalar(const Entry& entry) {
+  return entry.type.starts_with("Tree_float_5_4_3") || entry.type.starts_with("Tree_double_5_4_3");
+}
+
+void requireScalar(const std::string& name, const Entry& entry) {
+  if (!isScalar(entry))
+    throw Error(fmt::format("grid \"{}\" holds values of type {}; a density needs float, half or double", name,
+                            valueType(entry)));
+}
+
+void requireLinear(const std::string& name, const openvdb::GridBase& grid) {
+  if (!grid.transform().isLinear())
+    throw Error(fmt::format("grid \"{}\" has a perspective (frustum) transform; only affine ones are known", name));
+}
+
+AlignedBytes copyOf(const nanovdb::GridHandle<>& handle) {
+  AlignedBytes bytes(handle.size());
+  std::memcpy(bytes.data(), handle.data(), handle.size());
+  return bytes;
+}
+
+openvdb::FloatGrid::Ptr asFloat(const openvdb::GridBase::Ptr& grid) {
+  if (auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return floats;
+  const auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
+  if (!doubles) throw Error("file is truncated or damaged");
+  return std::make_shared<openvdb::FloatGrid>(*doubles);
+}
+
+AlignedBytes nanoTree(const openvdb::GridBase::Ptr& grid) {
+  return copyOf(nanovdb::openToNanoVDB(*asFloat(grid), nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable));
+}
+
+// OpenVDB reports ends of file as failures of the stream.
+template <class Body>
+auto guarded(const Body& body) {
+  try {
+    return body();
+  } catch (const std::ios_base::failure&) {
+    throw Error("file is truncated or damaged");
+  }
+}
+
+nanovdb::GridClass kindOf(const openvdb::GridBase& grid) {
+  switch (grid.getGridClass()) {
+    case openvdb::GRID_LEVEL_SET:
+      return nanovdb::GridClass::LevelSet;
+    case openvdb::GRID_FOG_VOLUME:
+      return nanovdb::GridClass::FogVolume;
+    case openvdb::GRID_STAGGERED:
+      return nanovdb::GridClass::Staggered;
+    default:
+      return nanovdb::GridClass::Unknown;
+  }
+}
+
+void describe(VdbReader& reader, const Entry& entry, GridInfo& info) {
+  try {
+    requireScalar(info.name, entry);
+    const openvdb::GridBase::Ptr grid = reader.read(entry);
+    requireLinear(info.name, *grid);
+    AlignedBytes tree = nanoTree(grid);
+    describeTree(*reinterpret_cast<nanovdb::FloatGrid*>(tree.data()), tree.size(), info);
+  } catch (const Error& e) {
+    info.problem = e.message();
+  }
+}
+
+openvdb::FloatGrid::Ptr gridOf(const DenseVolume& volume) {
+  initialiseOnce();
+  auto grid = openvdb::FloatGrid::create(0.f);
+  openvdb::math::Mat4d matrix;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix(column, row) = volume.indexToWorld(row, column);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(matrix));
+  grid->setName(volume.name);
+  grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  const openvdb::CoordBBox box({0, 0, 0}, {volume.nx - 1, volume.ny - 1, volume.nz - 1});
+  const openvdb::tools::Dense<const float, openvdb::tools::LayoutXYZ> dense(box, volume.values.data());
+  openvdb::tools::copyFromDense(dense, *grid, 0.f);
+  return grid;
+}
+
+// Archive's writer for seekable streams is not public.
+class VdbWriter : private openvdb::io::Archive {
+ public:
+  void write(std::ostream& out, const openvdb::GridBase::Ptr& grid) {
+    Archive::write(out, openvdb::GridPtrVec{grid}, /*seekable=*/true);
+  }
+};
+
+}  // namespace
+
+bool isVdb(const AlignedBytes& bytes) {
+  return bytes.size() >= sizeof(kMagic) && ByteReader(bytes.data(), bytes.size()).read<int64_t>() == kMagic;
+}
+
+std::shared_ptr<const Grid> loadVdb(const AlignedBytes& bytes, const VolumeRequest& request,
+                                    const GridOptions& options) {
+  AlignedBytes tree = guarded([&] {
+    VdbReader reader(bytes);
+    const std::vector<std::string> names = namesOf(reader.entries());
+    const size_t chosen = chooseGrid(names, request);
+    requireScalar(names[chosen], reader.entries()[chosen]);
+    const openvdb::GridBase::Ptr grid = reader.read(reader.entries()[chosen]);
+    requireFog(names[chosen], kindOf(*grid));
+    requireLinear(names[chosen], *grid);
+    return nanoTree(grid);
+  });
+  return GridFactory::tree(std::move(tree), options);
+}
+
+std::vector<GridInfo> vdbInfo(const AlignedBytes& bytes) {
+  return guarded([&] {
+    VdbReader reader(bytes);
+    const std::vector<std::string> names = namesOf(reader.entries());
+    std::vector<GridInfo> list;
+    for (size_t i = 0; i < names.size(); ++i) {
+      GridInfo& info = list.emplace_back();
+      info.name = names[i];
+      info.kind = "unknown";
+      info.valueType = valueType(reader.entries()[i]);
+      info.format = fmt::format("vdb {}", reader.version());
+      describe(reader, reader.entries()[i], info);
+    }
+    return list;
+  });
+}
+
+bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* out, size_t size) try {
+  // Blosc's own header says how long its buffer is and how long it was: neither may differ.
+  constexpr size_t kHeader = 16;
+  if (compressedSize < kHeader) return false;
+  ByteReader header(compressed, kHeader, 4);
+  const auto expanded = header.read<uint32_t>();
+  header.read<uint32_t>();
+  if (expanded != size || header.read<uint32_t>() != compressedSize) return false;
+  std::vector<std::byte> framed(sizeof(uint64_t) + compressedSize);
+  std::memcpy(framed.data(), &compressedSize, sizeof(uint64_t));
+  std::memcpy(framed.data() + sizeof(uint64_t), compressed, compressedSize);
+  MemoryStream stream(framed.data(), framed.size());
+  openvdb::io::bloscFromStream(stream, reinterpret_cast<char*>(out), size);
+  return true;
+} catch (const std::exception&) {
+  return false;
+}
+
+void writeVdb(const std::filesystem::path& path, const DenseVolume& volume) {
+  const openvdb::FloatGrid::Ptr grid = gridOf(volume);
+  writeAtomically(path, [&](std::ostream& out) { VdbWriter().write(out, grid); });
+}
+
+void writeNvdb(const std::filesystem::path& path, const DenseVolume& volume) {
+  const auto handle = nanovdb::openToNanoVDB(*gridOf(volume), nanovdb::StatsMode::All, nanovdb::ChecksumMode::Full);
+  writeAtomically(path, [&](std::ostream& out) { nanovdb::io::writeGrid(out, handle, nanovdb::io::Codec::ZIP); });
+}
+
+}  // namespace virga

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "volume/vol_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <ostream>
+
+namespace virga {
+namespace {
+
+constexpr char kMagic[] = {'V', 'O', 'L'};
+constexpr int kFloat32 = 1;
+constexpr int kVersion = 3;
+
+std::vector<float> floatsOf(const VolFile& file) {
+  std::vector<float> values(file.voxels() * static_cast<size_t>(file.channels));
+  std::memcpy(values.data(), file.values, values.size() * sizeof(float));
+  return values;
+}
+
+// The dimensions are believed only as far as the file has bytes for them.
+void requireSize(const VolFile& file, size_t bytes) {
+  double needed = sizeof(float);
+  for (int n : {file.nx, file.ny, file.nz, file.channels}) {
+    if (n < 1)
+      throw Error(
+          fmt::format("header says {} x {} x {} voxels of {} channels", file.nx, file.ny, file.nz, file.channels));
+    needed *= n;
+  }
+  if (needed != static_cast<double>(bytes))
+    throw Error(fmt::format("header says {} x {} x {} voxels of {} channels, which take {:.0f} bytes, but {} follow",
+                            file.nx, file.ny, file.nz, file.channels, needed, bytes));
+}
+
+template <class T>
+void put(std::ostream& out, T value) {
+  out.write(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+// World box of an axis-aligned volume.
+Bounds axisAlignedBounds(const DenseVolume& volume) {
+  const Matrix4& m = volume.indexToWorld;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column)
+      if (row == column ? !(m(row, column) > 0) : m(row, column) != 0)
+        throw Error("a .vol file holds axis-aligned boxes only");
+  const Affine map(m);
+  Bounds box;
+  box.extend(map.point(Vec3(-0.5f)));
+  box.extend(map.point(
+      Vec3(static_cast<float>(volume.nx), static_cast<float>(volume.ny), static_cast<float>(volume.nz)) - Vec3(0.5f)));
+  return box;
+}
+
+}  // namespace
+
+bool isVol(const AlignedBytes& bytes) {
+  return bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0;
+}
+
+VolFile parseVol(const AlignedBytes& bytes) {
+  ByteReader in(bytes.data(), bytes.size(), sizeof(kMagic));
+  const int version = in.read<uint8_t>();
+  if (version != kVersion)
+    throw Error(fmt::format("has version {} of the .vol format; only {} is known", version, kVersion));
+  const int type = in.read<int32_t>();
+  if (type != kFloat32)
+    throw Error(fmt::format("has values of .vol type {}; only {} (float32) is known", type, kFloat32));
+  VolFile file;
+  file.nx = in.read<int32_t>(), file.ny = in.read<int32_t>(), file.nz = in.read<int32_t>();
+  file.channels = in.read<int32_t>();
+  const auto box = in.read<std::array<float, 6>>();
+  file.bounds = {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
+  requireSize(file, in.left());
+  file.values = in.take(in.left());
+  return file;
+}
+
+std::shared_ptr<const Grid> loadVol(const AlignedBytes& bytes, const VolumeRequest& request,
+                                    const GridOptions& options) {
+  if (!request.grid.empty())
+    throw Error(fmt::format("no grid \"{}\": the grid of a .vol file has no name", request.grid));
+  const VolFile file = parseVol(bytes);
+  if (file.channels != 1) throw Error(fmt::format("has {} channels where one is wanted", file.channels));
+  return Grid::dense(file.nx, file.ny, file.nz, floatsOf(file), options);
+}
+
+RgbGrid loadRgbVolume(const std::filesystem::path& path) try {
+  const AlignedBytes bytes = readFile(path);
+  if (!isVol(bytes)) throw Error("is not a .vol file; only those hold colours");
+  const VolFile file = parseVol(bytes);
+  if (file.channels != 1 && file.channels != 3)
+    throw Error(fmt::format("has {} channels where 3 or 1 are wanted", file.channels));
+  const std::vector<float> values = floatsOf(file);
+  std::vector<Rgb> colours(file.voxels());
+  for (size_t i = 0; i < colours.size(); ++i)
+    colours[i] = file.channels == 1 ? Rgb(values[i]) : Rgb(values[3 * i], values[3 * i + 1], values[3 * i + 2]);
+  return RgbGrid(file.nx, file.ny, file.nz, std::move(colours));
+} catch (const Error& e) {
+  if (e.details().position.known()) throw;
+  throw e.at(inFile(path));
+}
+
+GridInfo volInfo(const AlignedBytes& bytes) {
+  const VolFile file = parseVol(bytes);
+  const std::vector<float> values = floatsOf(file);
+  GridInfo info;
+  info.kind = "fog volume", info.valueType = "float", info.format = "vol 3";
+  if (file.channels != 1) info.problem = fmt::format("has {} channels where one is wanted", file.channels);
+  info.activeVoxels = file.voxels();
+  info.indexHi = {file.nx - 1, file.ny - 1, file.nz - 1};
+  info.worldBounds = file.bounds;
+  info.bytes = values.size() * sizeof(float);
+  const auto [lo, hi] = std::minmax_element(values.begin(), values.end());
+  double sum = 0;
+  for (float value : values) sum += value;
+  if (std::isfinite(sum))
+    info.minimum = *lo, info.maximum = *hi, info.mean = static_cast<float>(sum / static_cast<double>(values.size()));
+  const Vec3 extent = file.bounds.extent(),
+             step{extent.x / static_cast<float>(file.nx), extent.y / static_cast<float>(file.ny),
+                  extent.z / static_cast<float>(file.nz)};
+  info.indexToWorld = Matrix4::translation(file.bounds.lo.x + 0.5 * step.x, file.bounds.lo.y + 0.5 * step.y,
+                                           file.bounds.lo.z + 0.5 * step.z) *
+                      Matrix4::scaling(step.x, step.y, step.z);
+  return info;
+}
+
+Bounds volBounds(const std::filesystem::path& path) try {
+  const AlignedBytes bytes = readFile(path);
+  if (!isVol(bytes)) throw Error("is not a .vol file; others carry a transform, not a box");
+  return parseVol(bytes).bounds;
+} catch (const Error& e) {
+  if (e.details().position.known()) throw;
+  throw e.at(inFile(path));
+}
+
+void writeVol(const std::filesystem::path& path, const DenseVolume& volume) {
+  const Bounds box = axisAlignedBounds(volume);
+  writeAtomically(path, [&](std::ostream& out) {
+    out.write(kMagic, sizeof(kMagic));
+    put(out, static_cast<uint8_t>(kVersion));
+    for (int32_t n : {kFloat32, volume.nx, volume.ny, volume.nz, 1}) put(out, n);
+    for (float x : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z}) put(out, x);
+    out.write(reinterpret_cast<const char*>(volume.values.data()),
+              static_cast<std::streamsize>(volume.values.size() * sizeof(float)));
+  });
+}
+
+}  // namespace virga

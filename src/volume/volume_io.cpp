@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "volume/volume_io.h"
+
+#include <fmt/format.h>
+
+#include "volume/file_bytes.h"
+#include "volume/nvdb_file.h"
+#include "volume/vdb_file.h"
+#include "volume/vol_file.h"
+
+namespace virga {
+namespace {
+
+// Readers know bytes only; here their errors learn the file's name, and whatever else a library throws becomes an
+// Error.
+template <class Body>
+auto withFile(const std::filesystem::path& path, const Body& body) {
+  try {
+    return body(readFile(path));
+  } catch (const Error& e) {
+    if (e.details().position.known()) throw;
+    throw e.at(inFile(path));
+  } catch (const std::bad_alloc&) {
+    throw Error("needs more memory than there is, or is damaged", {inFile(path), "", {}});
+  } catch (const std::exception& e) {
+    throw Error(fmt::format("file is damaged: {}", e.what()), {inFile(path), "", {}});
+  }
+}
+
+[[noreturn]] void refuseFormat() { throw Error("is not a volume: known are .vol, .vdb and .nvdb"); }
+
+}  // namespace
+
+std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const VolumeRequest& request,
+                                       const GridOptions& options) {
+  return withFile(path, [&](const AlignedBytes& bytes) {
+    if (isVol(bytes)) return loadVol(bytes, request, options);
+    if (isVdb(bytes)) return loadVdb(bytes, request, options);
+    if (isNvdb(bytes)) return loadNvdb(bytes, request, options);
+    refuseFormat();
+  });
+}
+
+std::vector<GridInfo> listGrids(const std::filesystem::path& path) {
+  return withFile(path, [&](const AlignedBytes& bytes) {
+    if (isVol(bytes)) return std::vector<GridInfo>{volInfo(bytes)};
+    if (isVdb(bytes)) return vdbInfo(bytes);
+    if (isNvdb(bytes)) return nvdbInfo(bytes);
+    refuseFormat();
+  });
+}
+
+}  // namespace virga
