@@ -117,7 +117,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   linkViews(*scene, *parts);
   const int declared = scene->view.cameraMedia.base();
   scene->view.cameraMedia = mediaAt(scene->view, *scene->boundaryRays, scene->camera.toWorld.translation);
-  scene->view.cameraMedia.setBase(declared);
+  if (declared != MediaState::kNone) scene->view.cameraMedia.setBase(declared);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);
   return scene;

@@ -107,6 +107,7 @@ struct LightSample {
   Rgb radiance;        ///< toward the receiver; for delta lights the incident irradiance [W/m^2] across wi
   float pdf = 0;       ///< [1/sr] of wi; 1 for delta lights; 0: no sample
   bool delta = false;
+  float uniformPdf = 0;  ///< [1/sr] that wi would have, were the point chosen uniformly on the light; 1 for point-like lights
 };
 
 /// A point on an emitter, chosen without regard to any receiver.
@@ -142,16 +143,21 @@ VIRGA_HD inline float coneHeight(float radius, float d) {
   return s2 / (1 + std::sqrt(std::fmax(0.f, 1 - s2)));
 }
 
-/// Density [1/sr] with which sampleLight picks the point `on` of an area emitter, seen from x; the point is known to face x.
-VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
-  if (shape.kind == ShapeView::Kind::sphere) {
-    const float d = distance(x, shape.center);
-    if (d > shape.radius * (1 + 1e-3f)) return 1 / (kTwoPi * coneHeight(shape.radius, d));
-  }
+/// Density [1/sr, seen from x] of a point that is chosen uniformly on an area light.
+VIRGA_HD inline float uniformPointPdf(const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
   const Vec3 toLight = on - x;
   const float d2 = lengthSquared(toLight);
   const float cosLight = std::fabs(dot(normal, toLight)) / std::sqrt(d2);
   return cosLight > 0 ? d2 / (cosLight * emitter.area) : 0;
+}
+
+/// Density [1/sr] with which sampleLight picks the point `on` of an area emitter, seen from x; the point is known to face x.
+VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
+  if (shape.kind == ShapeView::Kind::sphere) {
+    const float d = distance(x, shape.center);
+    if (d > shape.radius * (1 + 1e-3f) && shape.orientation > 0) return 1 / (kTwoPi * coneHeight(shape.radius, d));
+  }
+  return uniformPointPdf(emitter, x, on, normal);
 }
 
 /// Light of a point on an area emitter toward x; invalid (pdf 0) from behind.
@@ -161,10 +167,11 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
   if (!(d2 > 0)) return {};
   const float d = std::sqrt(d2);
   const Vec3 wi = toLight / d;
-  if (on.pointLike) return {wi, d, emitter.intensity(-wi) / d2, 1, true};
+  if (on.pointLike) return {wi, d, emitter.intensity(-wi) / d2, 1, true, 1};
   const float cosLight = -dot(on.normal, wi);
   if (cosLight <= 0) return {};
-  return {wi, d, emitter.value, on.areaPdf * d2 / cosLight, false};
+  const float pdf = on.areaPdf * d2 / cosLight;
+  return {wi, d, emitter.value, pdf, false, pdf};
 }
 
 VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
@@ -178,7 +185,10 @@ VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const Emit
   const float along = dot(wi, toCenter);
   const float miss2 = lengthSquared(toCenter - wi * along);
   const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
-  return {wi, along - half, emitter.value, 1 / (kTwoPi * height), false};
+  const float t = along - half;
+  const Vec3 on = x + wi * t;
+  const float uniform = uniformPointPdf(emitter, x, on, normalize(on - shape.center));
+  return {wi, t, emitter.value, 1 / (kTwoPi * height), false, uniform};
 }
 
 }  // namespace virga

@@ -92,7 +92,7 @@ MediaState mediaAt(const SceneView& scene, const RayScene& boundaries, Vec3 p) {
   std::set<uint32_t> seen;
   bool baseKnown = false;
   float from = 0;
-  for (CrossingList list;; from = list.items[CrossingList::kCapacity - 1].t, list = {}) {
+  for (CrossingList list;; from = std::nextafter(list.items[CrossingList::kCapacity - 1].t, kInfinity), list = {}) {
     boundaries.crossings(ray, from, kInfinity, list);
     for (const Crossing& c : list.crossings()) {
       if (!seen.insert(c.shape).second) continue;

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/path/path_method.h"
+
+#include "core/parallel.h"
+#include "methods/path/path_tracer.h"
+#include "methods/settings_reader.h"
+
+namespace virga {
+namespace {
+
+class PathMethod final : public Method {
+ public:
+  void prepare(SceneSnapshot scene, const Settings& settings, LayerMask) override {
+    scene_ = std::move(scene);
+    SettingsReader reader(settings, kPathSettings, "path");
+    maxDepth_ = reader.integer("max_depth", -1);
+    rrDepth_ = reader.integer("rr_depth", 1);
+    equiangular_ = reader.boolean("equiangular");
+    seed_ = settings.seed;
+  }
+
+  Reset update(SceneSnapshot next, const ChangeSet& changes) override {
+    scene_ = std::move(next);
+    return changes.empty() ? Reset::nothingLost : Reset::film;
+  }
+
+  PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
+    const EmbreeRays rays{*scene_->surfaceRays, *scene_->boundaryRays};
+    const PathOptions options = optionsForScene();
+    const PathTracer<EmbreeRays> tracer(scene_->view, rays, options);
+    const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
+    const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
+    constexpr int kTile = 16;
+    const int tilesX = (frame.width() + kTile - 1) / kTile, tilesY = (frame.height() + kTile - 1) / kTile;
+    parallelFor(int64_t{tilesX} * tilesY, 1, [&](int64_t tile) {
+      const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
+      for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
+        for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x)
+          frame.set(x, y, tracePixel(tracer, x, y, {seed_, replicate, pixelStream(x, y), sample}));
+    });
+    return {.completed = !stop.stop_requested()};
+  }
+
+ private:
+  PathOptions optionsForScene() const {
+    return {.maxDepth = maxDepth_.value_or(scene_->integrator.maxDepth),
+            .rrDepth = rrDepth_.value_or(scene_->integrator.rrDepth),
+            .equiangular = equiangular_.value_or(true)};
+  }
+  // Pixels by their place on the whole film, so that a crop window shows the very same samples.
+  uint32_t pixelStream(int x, int y) const {
+    const PerspectiveCamera& c = scene_->camera;
+    return static_cast<uint32_t>(y + c.cropY) * static_cast<uint32_t>(c.filmWidth) + static_cast<uint32_t>(x + c.cropX);
+  }
+  LayerRadiance tracePixel(const PathTracer<EmbreeRays>& tracer, int x, int y, const SampleId& id) const {
+    Sampler sampler(id);
+    const Vec2 offset = scene_->filter.sample(sampler.next2D());
+    const CameraRay ray = scene_->camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+    return tracer.trace(ray, distance(ray.ray.o, scene_->camera.toWorld.translation), sampler);
+  }
+
+  SceneSnapshot scene_;
+  std::optional<int> maxDepth_, rrDepth_;
+  std::optional<bool> equiangular_;
+  uint64_t seed_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Method> createPath() { return std::make_unique<PathMethod>(); }
+
+}  // namespace virga

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "methods/method.h"
+
+namespace virga {
+
+inline constexpr SettingInfo kPathSettings[] = {
+    {"max_depth", "the scene's", "longest path in segments, -1 for no limit; 2 is direct light"},
+    {"rr_depth", "the scene's", "scattering events before Russian roulette by throughput begins"},
+    {"equiangular", "true", "sample homogeneous media also by the angle about a light"},
+};
+
+/// Unidirectional volumetric path tracing: the reference that every other method is held against.
+std::unique_ptr<Method> createPath();
+
+}  // namespace virga

@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/sampler.h"
+#include "image/layers.h"
+#include "transport/equiangular.h"
+#include "transport/layer_path.h"
+#include "transport/media_walk.h"
+
+namespace virga {
+
+struct PathOptions {
+  int maxDepth = -1;  ///< segments; -1: no limit
+  int rrDepth = 5;    ///< scattering events before Russian roulette
+  bool equiangular = true;
+};
+
+/// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
+///
+/// Techniques for the light at a medium vertex, weighted against each other by the power heuristic:
+///   A  free flight to the vertex, then a point on a light;
+///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite distance);
+///   C  free flight to the vertex, then the phase function, which meets the light.
+/// At a surface vertex: A' a point on a light, C' the BSDF.
+template <class Rays>
+class PathTracer {
+ public:
+  VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
+      : scene_(scene), rays_(rays), options_(options) {}
+
+  /// Radiance along a camera ray, layer by layer [W/(m^2 sr)]. `behind`: from the near plane back to the eye [unit].
+  VIRGA_HD LayerRadiance trace(const CameraRay& camera, float behind, Sampler& sampler) const {
+    Path path;
+    path.at = {camera.ray, scene_.cameraMedia, behind};
+    path.tMax = camera.tMax;
+    while (extend(path, sampler)) {
+    }
+    return path.radiance;
+  }
+
+ private:
+  /// How the last vertex chose the ray's direction: what multiple importance sampling needs when the ray meets a light.
+  struct LastVertex {
+    Vec3 p;
+    float pdf = 0;           ///< [1/sr]
+    bool connected = false;  ///< it sampled the lights too; not so the camera and specular vertices
+    float t = 0;             ///< its place on `segment`, if that is active: it could have been found by technique B
+    EquiangularSegment segment;
+  };
+
+  struct Path {
+    MediaRay at;
+    float tMax = kInfinity;
+    Rgb throughput{1, 1, 1};
+    float etaScale = 1;  ///< product of squared relative indices: keeps the radiance scaling out of Russian roulette
+    int depth = 0;       ///< scattering events so far
+    LastVertex last;
+    LayerPath layers;
+    LayerRadiance radiance;
+
+    VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
+  };
+
+  /// The side of a surface that a ray arrives on.
+  struct Side {
+    const Bsdf* bsdf;
+    Frame frame;      ///< around the shading normal; turned over for the back of a two-sided bsdf
+    Vec3 wo;          ///< local
+    Vec3 normal;      ///< geometric, on the frame's side
+
+    /// Shading and true normal disagree about which side a direction is on: light would leak through the surface.
+    VIRGA_HD bool leaks(Vec3 world, Vec3 local) const { return dot(world, normal) * local.z <= 0; }
+  };
+
+  /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
+  static constexpr int kStratifiedBounces = 4;
+  /// Ends paths in closed white furnaces.
+  static constexpr float kMaxSurvival = 0.98f;
+
+  VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
+    return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
+  }
+  VIRGA_HD static float one(const Path& path, Sampler& sampler) {
+    return path.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
+  }
+  /// Power heuristic (exponent 2) of a technique against up to two others.
+  VIRGA_HD static float weight(float own, float other, float third = 0) {
+    return own > 0 ? 1 / (1 + square(other / own) + square(third / own)) : 0;
+  }
+  /// May light still be connected after one more scattering event?
+  VIRGA_HD bool mayScatter(const Path& path) const {
+    return options_.maxDepth < 0 || path.depth + 2 <= options_.maxDepth;
+  }
+
+  /// Follows the ray to its next vertex and scatters there; false at the end of the path.
+  VIRGA_HD bool extend(Path& path, Sampler& sampler) const {
+    const RayHit hit = rays_.nearest(path.at.ray, path.tMax);
+    MediaRay walk = path.at;
+    MediaState segmentMedia;
+    EquiangularSegment segment;
+    Collision collision;
+    bool first = options_.equiangular;
+    walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
+      if (walk.media.vacuum()) return true;
+      if (std::exchange(first, false)) {
+        segment = equiangularSegment(walk, t0, t1);
+        if (segment.active()) segmentMedia = walk.media;
+      }
+      collision = sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      return !collision.found();
+    });
+    if (segment.active() && mayScatter(path)) connectEquiangular(path, segment, segmentMedia, sampler);
+    if (collision.found()) return scatterInMedium(path, walk.media, collision, segment, sampler);
+    if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
+    addEnvironment(path);
+    return false;
+  }
+
+  VIRGA_HD EquiangularSegment equiangularSegment(const MediaRay& r, float t0, float t1) const {
+    if (r.media.count() != 1) return {};
+    const int index = r.media.medium(0);
+    const MediumView& medium = scene_.media[index];
+    if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
+    return {index, r.ray, t0, t1, medium.sigmaT};
+  }
+
+  // --- light that the path meets ---
+
+  VIRGA_HD void addEnvironment(Path& path) const {
+    if (scene_.environment < 0) return;
+    const EmitterView& emitter = scene_.emitters[scene_.environment];
+    const Vec3 w = path.at.ray.d;
+    const float connection = scene_.emitterChoice.probability(scene_.environment) * environmentPdf(emitter, w);
+    path.add(path.layers, environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
+  }
+
+  VIRGA_HD void addAreaLight(Path& path, const SurfacePoint& point) const {
+    const ShapeView& shape = scene_.surfaces[point.shape];
+    const EmitterView& emitter = scene_.emitters[shape.emitter];
+    if (dot(point.geometricNormal, path.at.ray.d) >= 0) return;
+    float w = 1;
+    const LastVertex& last = path.last;
+    if (last.connected) {
+      const float choice = scene_.emitterChoice.probability(shape.emitter);
+      const float connection = choice * areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
+      if (last.segment.active()) {
+        const float flight = last.segment.freeFlightPdf(last.t);
+        const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
+        const float equiangular = choice * uniform * last.segment.pdf(point.p, last.t);
+        w = weight(flight * last.pdf, flight * connection, equiangular);
+      } else {
+        w = weight(last.pdf, connection);
+      }
+    }
+    path.add(path.layers, emitter.value * w);
+  }
+
+  // --- next-event estimation ---
+
+  /// Transmittance times visibility from a point toward a light; 0 where a surface is in the way.
+  VIRGA_HD float visibility(const MediaRay& r, float lightDistance, Sampler& sampler) const {
+    // Stop short of the light's own surface.
+    const float tMax = std::isinf(lightDistance) ? kInfinity : lightDistance * (1 - 2 * kHitError) - kHitError * 1e-2f * scene_.scale;
+    if (tMax <= 0) return 1;
+    if (rays_.occluded(r.ray, tMax)) return 0;
+    return transmittance(scene_, rays_, r, tMax, sampler.stream());
+  }
+
+  struct Connection {
+    LightSample light;
+    int emitter = -1;
+    float choice = 0;  ///< probability of the emitter
+  };
+
+  VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, Sampler& sampler) const {
+    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
+    const Vec2 u = pair(path, sampler);
+    return {sampleLight(scene_, scene_.emitters[choice.index], x, u), choice.index, choice.probability};
+  }
+
+  VIRGA_HD bool hasLights() const { return scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0; }
+
+  /// Technique B: a vertex on the segment by its angle about a point on a light, connected to that point.
+  VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media, Sampler& sampler) const {
+    if (!hasLights()) return;
+    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
+    const EmitterView& emitter = scene_.emitters[choice.index];
+    const Vec2 u = pair(path, sampler);
+    const float uDistance = one(path, sampler);
+    if (!emitter.isLocal()) return;
+    const LightPoint on = sampleLightPoint(scene_, emitter, u);
+    const EquiangularSegment::Sample distance = segment.sample(on.p, uDistance);
+    if (!(distance.pdf > 0)) return;
+    const Vec3 x = segment.ray.at(distance.t), wo = -segment.ray.d;
+    const LightSample light = towardPoint(emitter, x, on);
+    if (!(light.pdf > 0) || isBlack(light.radiance)) return;
+
+    const MediumView& medium = scene_.media[segment.medium];
+    const float phase = medium.phase.value(wo, light.wi);
+    const float flight = segment.freeFlightPdf(distance.t);
+    const float own = choice.probability * distance.pdf * light.pdf;
+    float w = 1;
+    if (light.delta) {
+      w = weight(own, flight * choice.probability);
+    } else {
+      const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
+      w = weight(own, flight * choice.probability * connection, flight * medium.phase.pdf(wo, light.wi));
+    }
+    const float seen = visibility({{x, light.wi}, media, 0}, light.distance, sampler);
+    LayerPath layers = path.layers;
+    layers.scatter(LayerPath::Vertex::medium);
+    // sigma_s tau = albedo * flight
+    path.add(layers, medium.albedoAt(x) * light.radiance * (flight * phase * seen * w / own));
+  }
+
+  /// Technique A at a medium vertex.
+  VIRGA_HD void connectMedium(Path& path, const MediumView& medium, const MediaState& media, Vec3 x, Vec3 wo, Sampler& sampler) const {
+    if (!hasLights()) return;
+    const Connection c = sampleConnection(path, x, sampler);
+    if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
+    const float own = c.choice * c.light.pdf;
+    const float phasePdf = c.light.delta ? 0 : medium.phase.pdf(wo, c.light.wi);
+    float w = weight(own, phasePdf);
+    const EquiangularSegment& segment = path.last.segment;
+    const EmitterView& emitter = scene_.emitters[c.emitter];
+    if (segment.active() && emitter.isLocal()) {
+      const Vec3 y = x + c.light.wi * c.light.distance;
+      const float flight = segment.freeFlightPdf(path.last.t);
+      w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
+    }
+    const float seen = visibility({{x, c.light.wi}, media, 0}, c.light.distance, sampler);
+    if (seen > 0) path.add(path.layers, c.light.radiance * (medium.phase.value(wo, c.light.wi) * seen * w / own));
+  }
+
+  /// Technique A' at a surface vertex.
+  VIRGA_HD void connectSurface(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
+                               Sampler& sampler) const {
+    if (!hasLights()) return;
+    const Connection c = sampleConnection(path, point.p, sampler);
+    if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
+    const Vec3 wi = side.frame.toLocal(c.light.wi);
+    const Rgb value = side.leaks(c.light.wi, wi) ? Rgb() : side.bsdf->value(side.wo, wi);
+    if (isBlack(value)) return;
+    const float own = c.choice * c.light.pdf;
+    const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
+    const float seen = visibility(leave(point, c.light.wi, media), c.light.distance, sampler);
+    if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
+  }
+
+  // --- vertices ---
+
+  VIRGA_HD bool scatterInMedium(Path& path, const MediaState& media, const Collision& collision,
+                                const EquiangularSegment& segment, Sampler& sampler) const {
+    if (!mayScatter(path)) return false;
+    const MediumView& medium = scene_.media[collision.medium];
+    const Vec3 x = path.at.ray.at(collision.t), wo = -path.at.ray.d;
+    path.throughput *= medium.albedoAt(x);
+    if (isBlack(path.throughput)) return false;
+    path.layers.scatter(LayerPath::Vertex::medium);
+    path.last = {x, 0, true, collision.t, {}};
+    if (segment.contains(collision.t) && collision.medium == segment.medium) path.last.segment = segment;
+    connectMedium(path, medium, media, x, wo, sampler);
+
+    const PhaseSample s = medium.phase.sample(wo, pair(path, sampler));
+    path.throughput *= s.value / s.pdf;
+    path.last.pdf = s.pdf;
+    path.at = {{x, s.wi}, media, 0};
+    path.tMax = kInfinity;
+    ++path.depth;
+    return survives(path, sampler);
+  }
+
+  VIRGA_HD Side sideOf(const SurfacePoint& point, Vec3 wo) const {
+    const SurfaceBsdf& surface = scene_.bsdfs[scene_.surfaces[point.shape].bsdf];
+    const bool back = surface.twoSided && dot(wo, point.geometricNormal) < 0;
+    const Vec3 n = back ? -point.shadingNormal : point.shadingNormal;
+    const Frame frame(n);
+    return {back ? &surface.back : &surface.front, frame, frame.toLocal(wo), back ? -point.geometricNormal : point.geometricNormal};
+  }
+
+  /// The ray that leaves a surface toward w. What lies on the surface's own plane is looked for behind the origin, too.
+  VIRGA_HD static MediaRay leave(const SurfacePoint& point, Vec3 w, const MediaState& media) {
+    const float along = std::fmax(std::fabs(dot(w, point.geometricNormal)), 1e-3f);
+    return {{point.originToward(w), w}, media, 4 * point.epsilon / along};
+  }
+
+  VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {
+    const ShapeView& shape = scene_.surfaces[hit.shape];
+    const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
+    if (shape.emitter >= 0) addAreaLight(path, point);
+    if (!mayScatter(path)) return false;
+    const Vec3 wo = -path.at.ray.d;
+    const Side side = sideOf(point, wo);
+    if (side.leaks(wo, side.wo)) return false;
+    const bool specular = side.bsdf->specular();
+    if (specular) {
+      path.layers.scatterSpecularly();
+    } else {
+      path.layers.scatter(LayerPath::Vertex::surface);
+      connectSurface(path, point, side, media, sampler);
+    }
+
+    const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    if (!(s.pdf > 0) || isBlack(s.weight)) return false;
+    const Vec3 wi = side.frame.toWorld(s.wi);
+    if (side.leaks(wi, s.wi)) return false;
+    path.throughput *= s.weight;
+    path.etaScale *= s.eta * s.eta;
+    path.last = {point.p, s.pdf, !specular, 0, {}};
+    path.at = leave(point, wi, media);
+    const bool passes = dot(wi, point.geometricNormal) * dot(wo, point.geometricNormal) < 0;
+    if (passes && shape.media.replaces)
+      path.at.media.replace(dot(wi, point.geometricNormal) < 0 ? shape.media.interior : shape.media.exterior);
+    path.tMax = kInfinity;
+    ++path.depth;
+    return survives(path, sampler);
+  }
+
+  VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
+    if (path.depth < options_.rrDepth) return true;
+    const float q = std::fmin(maxComponent(path.throughput) * path.etaScale, kMaxSurvival);
+    if (!(sampler.random() < q)) return false;
+    path.throughput *= 1 / q;
+    return true;
+  }
+
+  const SceneView& scene_;
+  const Rays& rays_;
+  const PathOptions& options_;
+};
+
+}  // namespace virga

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/settings_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+namespace virga {
+
+SettingsReader::SettingsReader(const Settings& settings, std::span<const SettingInfo> known, std::string_view method)
+    : settings_(settings), method_(method) {
+  std::vector<std::string> names;
+  for (const SettingInfo& s : known) names.emplace_back(s.name);
+  for (const auto& [name, value] : settings.values)
+    if (std::find(names.begin(), names.end(), name) == names.end())
+      throw Error(fmt::format("method \"{}\" has no setting \"{}\"", method, name),
+                  {{}, didYouMean(name, names), {"available: " + joined(names)}});
+}
+
+std::optional<int> SettingsReader::integer(std::string_view name, int lowest) const {
+  const std::string* text = find(name);
+  if (!text) return {};
+  int value = 0;
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (error != std::errc() || end != text->data() + text->size() || value < lowest)
+    fail(name, fmt::format("an integer of at least {}", lowest));
+  return value;
+}
+
+std::optional<bool> SettingsReader::boolean(std::string_view name) const {
+  const std::string* text = find(name);
+  if (!text) return {};
+  if (*text == "true" || *text == "on" || *text == "1") return true;
+  if (*text == "false" || *text == "off" || *text == "0") return false;
+  fail(name, "true or false");
+}
+
+const std::string* SettingsReader::find(std::string_view name) const {
+  const auto it = settings_.values.find(name);
+  return it == settings_.values.end() ? nullptr : &it->second;
+}
+
+void SettingsReader::fail(std::string_view name, std::string_view expected) const {
+  throw Error(fmt::format("--set {}.{}: \"{}\" is not {}", method_, name, *find(name), expected));
+}
+
+}  // namespace virga

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "methods/method.h"
+
+namespace virga {
+
+/// Reads a method's settings. Unknown names and values that are of the wrong kind or out of range throw Error with a remedy.
+class SettingsReader {
+ public:
+  SettingsReader(const Settings& settings, std::span<const SettingInfo> known, std::string_view method);
+
+  /// Empty where the setting was not given.
+  std::optional<int> integer(std::string_view name, int lowest) const;
+  std::optional<bool> boolean(std::string_view name) const;
+
+ private:
+  const std::string* find(std::string_view name) const;
+  [[noreturn]] void fail(std::string_view name, std::string_view expected) const;
+
+  const Settings& settings_;
+  std::string_view method_;
+};
+
+}  // namespace virga

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "scene/scene_view.h"
+
+namespace virga {
+
+/// Part of a ray in one homogeneous medium, where scattering points can be drawn in proportion to the inverse squared distance to
+/// a light (Kulla and Fajardo 2012) instead of by free flight. Before it the ray meets no medium.
+struct EquiangularSegment {
+  int medium = -1;         ///< -1: there is none
+  Ray ray;
+  float t0 = 0, t1 = 0;    ///< t1 may be infinite
+  float sigmaT = 0;        ///< [1/unit]
+
+  VIRGA_HD bool active() const { return medium >= 0; }
+  VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
+
+  /// Density of a free flight that ends at t [1/unit].
+  VIRGA_HD float freeFlightPdf(float t) const { return sigmaT * transmittanceTo(t); }
+  VIRGA_HD float transmittanceTo(float t) const { return std::exp(-sigmaT * (t - t0)); }
+
+  struct Sample {
+    float t, pdf;  ///< pdf in [1/unit]; 0: no sample
+  };
+  /// t = t_y + D tan(theta), theta uniform between the ends; D the distance from y to the line.
+  VIRGA_HD Sample sample(Vec3 y, float u) const {
+    const Angles a(*this, y);
+    const float x = a.height * std::tan(lerp(a.theta0, a.theta1, u));
+    const float t = clamp(a.foot + x, t0, t1);
+    return {t, a.pdf(x)};
+  }
+  VIRGA_HD float pdf(Vec3 y, float t) const {
+    const Angles a(*this, y);
+    return a.pdf(t - a.foot);
+  }
+
+ private:
+  struct Angles {
+    float foot, height, theta0, theta1;
+
+    VIRGA_HD Angles(const EquiangularSegment& s, Vec3 y) {
+      const Vec3 toLight = y - s.ray.o;
+      foot = dot(toLight, s.ray.d);
+      // A light on the ray would leave no width to sample; the floor keeps the density finite and exact for what is drawn.
+      height = std::fmax(length(toLight - s.ray.d * foot), 1e-4f * std::fmax(std::fabs(foot), 1e-20f));
+      theta0 = std::atan((s.t0 - foot) / height);
+      theta1 = std::isinf(s.t1) ? kPi / 2 : std::atan((s.t1 - foot) / height);
+    }
+    VIRGA_HD float pdf(float x) const {
+      const float range = theta1 - theta0;
+      return range > 0 ? height / (range * (height * height + x * x)) : 0;
+    }
+  };
+};
+
+}  // namespace virga

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include "core/random.h"
+#include "scene/medium.h"
+
+namespace virga {
+
+/// The part [t0, t1] of a ray that lies in a box; empty where t0 >= t1.
+struct ClippedRange {
+  float t0, t1;
+};
+
+VIRGA_HD inline ClippedRange clipToBox(Vec3 o, Vec3 d, Vec3 lo, Vec3 hi, float t0, float t1) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == 0) {
+      if (o[axis] < lo[axis] || o[axis] > hi[axis]) return {t0, t0};
+      continue;
+    }
+    const float inverse = 1 / d[axis];
+    const float a = (lo[axis] - o[axis]) * inverse, b = (hi[axis] - o[axis]) * inverse;
+    t0 = std::fmax(t0, std::fmin(a, b));
+    t1 = std::fmin(t1, std::fmax(a, b));
+  }
+  return {t0, t1};
+}
+
+/// Walks the cells of a majorant grid along o + t d (index coordinates of the fine grid; d of any length) for t in [t0, t1], which
+/// lies in the grid's box: visit(a, b, majorant) for each piece, in order, until it returns false. Returns false if it did.
+template <class Visit>
+VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
+  const int count[3] = {grid.nx, grid.ny, grid.nz};
+  int cell[3], step[3];
+  float next[3], delta[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float inverseSize = 1 / grid.cellSize[axis];
+    const float start = (o[axis] + d[axis] * t0 - grid.origin[axis]) * inverseSize;
+    const float top = static_cast<float>(count[axis] - 1);
+    cell[axis] = static_cast<int>(clamp(std::floor(start), 0.f, top));
+    const float speed = d[axis] * inverseSize;
+    step[axis] = speed < 0 ? -1 : 1;
+    delta[axis] = speed == 0 ? kInfinity : std::fabs(1 / speed);
+    const float edge = static_cast<float>(cell[axis] + (speed < 0 ? 0 : 1));
+    next[axis] = speed == 0 ? kInfinity : (edge - (o[axis] - grid.origin[axis]) * inverseSize) / speed;
+  }
+  for (float t = t0; t < t1;) {
+    const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
+    const float end = std::fmin(next[axis], t1);
+    if (end > t && !visit(t, end, grid.cell(cell[0], cell[1], cell[2]))) return false;
+    t = std::fmax(t, end);
+    next[axis] += delta[axis];
+    cell[axis] += step[axis];
+    if (cell[axis] < 0 || cell[axis] >= count[axis]) {
+      // Rounding may step out just before the end: the rest is the last cell's neighbour in name only.
+      cell[axis] = cell[axis] < 0 ? 0 : count[axis] - 1;
+      next[axis] = kInfinity;
+    }
+  }
+  return true;
+}
+
+/// Pieces of [t0, t1] along a world-space ray, each with a bound of the density: the grid's cells inside its support, its
+/// background outside. visit(a, b, majorant, inside) until it returns false.
+template <class Visit>
+VIRGA_HD void forEachMajorant(const GridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
+  const ClippedRange in = clipToBox(o, d, grid.supportLo, grid.supportHi, t0, t1);
+  const bool meets = in.t0 < in.t1;
+  if (grid.background > 0 && !visit(t0, meets ? in.t0 : t1, grid.background, false)) return;
+  if (!meets) return;
+  if (!walkMajorants(grid.majorant, o, d, in.t0, in.t1,
+                     [&](float a, float b, float majorant) { return visit(a, b, majorant, true); }))
+    return;
+  if (grid.background > 0) visit(in.t1, t1, grid.background, false);
+}
+
+/// A ray in the index coordinates of a medium's grid; t stays the same.
+struct GridRay {
+  Vec3 o, d;
+  VIRGA_HD GridRay(const MediumView& medium, const Ray& ray)
+      : o(medium.worldToDensity.point(ray.o)), d(medium.worldToDensity.vector(ray.d)) {}
+};
+
+VIRGA_HD inline float exponential(Pcg32& random) { return -std::log(1 - random.next()); }
+
+/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the medium is
+/// homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
+VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+  if (medium.homogeneous) {
+    const float t = t0 + exponential(random) / medium.sigmaT;
+    return t < t1 ? t : kInfinity;
+  }
+  const GridRay g(medium, ray);
+  float depth = exponential(random);  // optical depth left until the next tentative collision
+  float found = kInfinity;
+  forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
+    const float mu = majorant * medium.sigmaT;
+    for (float t = a;;) {
+      const float here = (b - t) * mu;
+      if (!(depth < here)) {
+        depth -= here;
+        return true;
+      }
+      t += depth / mu;
+      const float density = inside ? medium.density.lookupInside(g.o + g.d * t) : majorant;
+      if (random.next() * majorant < density) {
+        found = t;
+        return false;
+      }
+      depth = exponential(random);
+    }
+  });
+  return found;
+}
+
+/// Below this a transmittance estimate plays Russian roulette.
+inline constexpr float kTransmittanceRoulette = 0.1f;
+
+/// Unbiased estimate of tau(t0, t1), in [0, 1]. Analytic where the medium is homogeneous, otherwise ratio tracking (Novak et al.
+/// 2014) on local majorants.
+VIRGA_HD inline float estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+  if (medium.homogeneous) return medium.sigmaT > 0 ? std::exp(-medium.sigmaT * (t1 - t0)) : 1;
+  const GridRay g(medium, ray);
+  float transmittance = 1, depth = exponential(random);
+  forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
+    const float mu = majorant * medium.sigmaT;
+    for (float t = a;;) {
+      const float here = (b - t) * mu;
+      if (!(depth < here)) {
+        depth -= here;
+        return true;
+      }
+      t += depth / mu;
+      const float density = inside ? medium.density.lookupInside(g.o + g.d * t) : majorant;
+      transmittance *= 1 - density / majorant;
+      if (transmittance < kTransmittanceRoulette) {
+        if (!(random.next() * kTransmittanceRoulette < transmittance)) {
+          transmittance = 0;
+          return false;
+        }
+        transmittance = kTransmittanceRoulette;
+      }
+      depth = exponential(random);
+    }
+  });
+  return transmittance;
+}
+
+}  // namespace virga
