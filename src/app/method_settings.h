@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "methods/method.h"
+
+namespace virga::app {
+
+/// From `method.param=value` texts; the last one of a parameter counts. Throws Error where the method is another or has no
+/// such parameter.
+Settings methodSettings(const MethodInfo&, const std::vector<std::string>& assignments, uint64_t seed);
+
+}  // namespace virga::app

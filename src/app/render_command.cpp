@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <utility>
+
+#include "app/interrupt.h"
+#include "app/method_settings.h"
+#include "app/options.h"
+#include "app/output_files.h"
+#include "app/progress.h"
+#include "app/render_loop.h"
+#include "app/render_report.h"
+#include "app/scene_source.h"
+#include "app/stopwatch.h"
+#include "image/atomic_write.h"
+#include "scene/builder.h"
+
+namespace virga::app {
+namespace {
+
+// Runs `step`, and says how long it took.
+template <class Step>
+auto timed(double& seconds, const Step& step) {
+  const Stopwatch watch;
+  auto result = step();
+  seconds = watch.seconds();
+  return result;
+}
+
+std::vector<std::string> outputsOf(const RenderOptions& options) {
+  if (!options.outputs.empty()) return options.outputs;
+  return {std::filesystem::path(options.scene.file).stem().string() + ".exr"};
+}
+
+// An --error that a method cannot keep is refused before it has cost hours.
+void requireErrorEstimate(const RenderOptions& options, const MethodInfo& method) {
+  if (!options.stop.relMse || method.accuracy != Accuracy::biased) return;
+  throw Error(fmt::format("--error: \"{}\" is biased, so its noise does not tell its error", method.name),
+              {.position = {}, .hint = "use --passes or --time", .notes = {}});
+}
+
+StopRules rulesFor(const RenderOptions& options, const Scene& scene) {
+  StopRules rules = options.stop;
+  if (!rules.any()) rules.passes = scene.integrator.sampleCount;
+  return rules;
+}
+
+// The film holds a picture for each replicate and one for the pass in the making. To be refused here is better than to be
+// killed by the system for memory it promised and does not have.
+void requireMemory(const Scene& scene, LayerMask layers) {
+  const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
+  const double planes = layers == LayerMask::none() ? 1 : kLayerCount;
+  const double needed = pixels * sizeof(Rgb) * planes * (Film::kReplicates + 2);
+  const double available = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  if (needed <= available) return;
+  throw Error(fmt::format("a picture of {} x {} pixels needs {} of memory; this machine has {}", scene.camera.width,
+                          scene.camera.height, bytesText(needed), bytesText(available)),
+              {.position = {}, .hint = "choose a smaller --size", .notes = {}});
+}
+
+class RenderJob {
+ public:
+  RenderJob(const RenderOptions& options, Interrupt& interrupt, int threads)
+      : options_(options), method_(findMethod(options.method)), interrupt_(interrupt) {
+    report_.sceneFile = options.scene.file;
+    report_.outputs = outputsOf(options);
+    report_.threads = threads;
+  }
+
+  void run() {
+    checkNames(report_.outputs, options_.stats);
+    requireErrorEstimate(options_, method_);
+    const Settings settings = methodSettings(method_, options_.settings, options_.seed);
+    checkAllWritable(report_.outputs, options_.stats);
+    const SceneSnapshot scene = loadAndBuild();
+    const LayerMask layers = options_.layers ? method_.layers : LayerMask::none();
+    requireMemory(*scene, layers);
+    const auto session = timed(report_.timings.prepare, [&] {
+      return std::make_unique<RenderSession>(scene, method_, RenderSession::Options{settings, layers});
+    });
+    renderPasses(*session);
+    write(*session);
+  }
+
+ private:
+  SceneSnapshot loadAndBuild() {
+    const SceneDescription description =
+        timed(report_.timings.load, [&] { return loadScene(options_.scene, report_.warnings); });
+    SceneSnapshot scene = timed(report_.timings.build, [&] {
+      return buildScene(description, {.filmSize = options_.size, .lenient = options_.scene.lenient});
+    });
+    report_.warnings.insert(report_.warnings.end(), scene->warnings.begin(), scene->warnings.end());
+    for (const std::string& warning : report_.warnings) say("{}\n", warning);
+    return scene;
+  }
+
+  void renderPasses(RenderSession& session) {
+    const StopRules rules = rulesFor(options_, session.scene());
+    Progress progress(options_.quiet ? Progress::Mode::silent : Progress::automatic(), rules);
+    const double cpuBefore = cpuSeconds();
+    report_.outcome = renderLoop(session, rules, interrupt_.token(), [&](const RenderState& s) { progress.show(s); });
+    report_.timings.render = report_.outcome.state.seconds;
+    report_.timings.renderCpu = cpuSeconds() - cpuBefore;
+    progress.finish(report_.outcome.state);
+    if (report_.outcome.reason == StopReason::interrupted)
+      say("interrupted: the picture holds {} of the passes\n", session.film().passes());
+  }
+
+  void write(const RenderSession& session) {
+    warnOfNonFinite(session.film());
+    const auto shield = interrupt_.shield();
+    const Stopwatch watch;
+    writePictures(report_.outputs, developed(session, report_.outcome, report_.sceneFile,
+                                             options_.layers ? WithLayers::yes : WithLayers::no));
+    report_.timings.write = watch.seconds();
+    report_.timings.total = total_.seconds();
+    report_.timings.totalCpu = cpuSeconds();
+    if (!options_.stats.empty()) writeAtomically(options_.stats, statsJson(session, report_));
+    for (const std::string& path : report_.outputs) say("wrote {}\n", path);
+  }
+
+  void warnOfNonFinite(const Film& film) {
+    if (film.nonFiniteSamples() == 0) return;
+    report_.warnings.push_back(fmt::format("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
+                                           film.nonFiniteSamples()));
+    say("warning: {}\n", report_.warnings.back());
+  }
+
+  template <class... Args>
+  void say(fmt::format_string<Args...> format, Args&&... args) const {
+    if (!options_.quiet) fmt::print(stderr, format, std::forward<Args>(args)...);
+  }
+
+  const RenderOptions& options_;
+  const MethodInfo& method_;
+  Interrupt& interrupt_;
+  Stopwatch total_;
+  RenderReport report_;
+};
+
+}  // namespace
+
+int render(const RenderOptions& options) {
+  Interrupt interrupt([quiet = options.quiet] {
+    if (!quiet) fmt::print(stderr, "\nstopping: the picture is written; once more: quit at once, without it\n");
+  });
+  const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+  tbb::task_arena arena(threads);
+  arena.execute([&] { RenderJob(options, interrupt, threads).run(); });
+  return 0;
+}
+
+}  // namespace virga::app

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "app/render_report.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "app/stopwatch.h"
+
+namespace virga::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// The value that a parameter has: given, or the method's default.
+std::map<std::string, std::string> effectiveSettings(const RenderSession& session) {
+  std::map<std::string, std::string> out;
+  for (const SettingInfo& s : session.info().settings) out[std::string(s.name)] = std::string(s.defaultValue);
+  for (const auto& [name, value] : session.settings().values) out[name] = value;
+  return out;
+}
+
+// A method may turn out biased by a setting that its registry row knows nothing of.
+std::string_view biasClass(const RenderSession& session, const LoopOutcome& outcome) {
+  const Accuracy accuracy = session.info().accuracy;
+  return accuracyName(outcome.biased && accuracy == Accuracy::unbiased ? Accuracy::biased : accuracy);
+}
+
+Metadata metadata(const RenderSession& session, const LoopOutcome& outcome, const std::string& sceneFile) {
+  Metadata m;
+  m["virga.version"] = VIRGA_VERSION;
+  m["virga.scene"] = sceneFile;
+  m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
+  m["virga.method"] = std::string(session.info().name);
+  for (const auto& [name, value] : effectiveSettings(session)) m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
+  m["virga.seed"] = std::to_string(session.settings().seed);
+  m["virga.passes"] = session.film().passes();
+  m["virga.seconds"] = outcome.state.seconds;
+  m["virga.bias"] = std::string(biasClass(session, outcome));
+  m["virga.non_finite_samples"] = static_cast<int64_t>(session.film().nonFiniteSamples());
+  m["virga.replicates"] = int64_t{Film::kReplicates};
+  if (const auto error = session.film().estimatedRelMse()) m["virga.estimated_relmse"] = *error;
+  return m;
+}
+
+void addLayers(const Film& film, LayeredImage& picture) {
+  for (int i = 0; i < kLayerCount; ++i) {
+    const Layer layer = static_cast<Layer>(i);
+    if (!film.layers().has(layer)) continue;
+    const std::string name(kLayerNames[static_cast<size_t>(i)]);
+    picture.layers.emplace_back(name, film.layer(layer));
+    if (film.hasVariance()) picture.layerVariances.emplace_back(name, film.layerVariance(layer));
+  }
+  if (film.hasVariance()) picture.variance = film.beautyVariance();
+}
+
+Json timingsJson(const Timings& t) {
+  return {{"load", t.load},   {"build", t.build},           {"prepare", t.prepare},    {"render", t.render},
+          {"write", t.write}, {"render_cpu", t.renderCpu}, {"total_cpu", t.totalCpu}, {"total", t.total}};
+}
+
+Json sceneJson(const RenderSession& session, const std::string& file) {
+  return {{"file", file},
+          {"hash", hashText(contentHash(session.scene().description))},
+          {"width", session.film().width()},
+          {"height", session.film().height()}};
+}
+
+Json methodJson(const RenderSession& session, const LoopOutcome& outcome) {
+  return {{"name", session.info().name},
+          {"bias", biasClass(session, outcome)},
+          {"settings", effectiveSettings(session)},
+          {"seed", session.settings().seed}};
+}
+
+double samplesPerSecond(const RenderSession& session, const RenderState& state) {
+  const double pixels = static_cast<double>(session.film().width()) * session.film().height();
+  return state.seconds > 0 ? pixels * static_cast<double>(state.passes) / state.seconds : 0;
+}
+
+}  // namespace
+
+std::string hashText(uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+LayeredImage developed(const RenderSession& session, const LoopOutcome& outcome, const std::string& sceneFile,
+                       WithLayers withLayers) {
+  LayeredImage picture;
+  picture.beauty = session.film().beauty();
+  if (withLayers == WithLayers::yes) addLayers(session.film(), picture);
+  picture.metadata = metadata(session, outcome, sceneFile);
+  return picture;
+}
+
+std::string statsJson(const RenderSession& session, const RenderReport& report) {
+  const auto error = session.film().estimatedRelMse();
+  const Json json = {{"version", VIRGA_VERSION},
+                     {"scene", sceneJson(session, report.sceneFile)},
+                     {"method", methodJson(session, report.outcome)},
+                     {"threads", report.threads},
+                     {"passes", session.film().passes()},
+                     {"stopped_by", stopReasonName(report.outcome.reason)},
+                     {"seconds", timingsJson(report.timings)},
+                     {"samples_per_second", samplesPerSecond(session, report.outcome.state)},
+                     {"estimated_relmse", error ? Json(*error) : Json(nullptr)},
+                     {"non_finite_samples", session.film().nonFiniteSamples()},
+                     {"peak_resident_bytes", peakResidentBytes()},
+                     {"warnings", report.warnings},
+                     {"outputs", report.outputs}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace virga::app

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "app/options.h"
+#include "scene/description.h"
+
+namespace virga::app {
+
+/// A scene file, or a bare volume in a ready scene. Warnings are full texts. Throws Error.
+SceneDescription loadScene(const SceneOptions&, std::vector<std::string>& warnings);
+
+/// A ready scene around the volume: of several grids, "density" or the first that can be loaded. Throws Error where there is none.
+SceneDescription sceneAroundVolume(const std::string& file);
+
+/// ".vdb", ".nvdb" or ".vol".
+bool isVolumeFile(const std::string& path);
+
+}  // namespace virga::app
