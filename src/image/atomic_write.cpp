@@ -123,16 +123,19 @@ bool isDeviceOrPipe(const fs::path& path) {
   return fs::is_character_file(path, ignored) || fs::is_fifo(path, ignored) || fs::is_block_file(path, ignored);
 }
 
-void refuseFolder(const fs::path& path) {
-  std::error_code ignored;
-  if (!path.has_filename() || fs::is_directory(path, ignored)) refuse(path, EISDIR);
+// What a temporary file beside the target would not show.
+void checkName(const fs::path& path) {
+  std::error_code failure;
+  const fs::file_status status = fs::status(path, failure);
+  if (!path.has_filename() || fs::is_directory(status)) refuse(path, EISDIR);
+  if (failure == std::errc::filename_too_long) refuse(path, ENAMETOOLONG);
 }
 
 }  // namespace
 
 void writeAtomically(const fs::path& path, std::string_view bytes) {
   const fs::path target = followed(path);
-  refuseFolder(target);
+  checkName(target);
   if (isDeviceOrPipe(target)) return OutputFile(target, 0, path).write(bytes);
   TemporaryFile file(target);
   file.write(bytes);
@@ -141,7 +144,7 @@ void writeAtomically(const fs::path& path, std::string_view bytes) {
 
 void checkWritable(const fs::path& path) {
   const fs::path target = followed(path);
-  refuseFolder(target);
+  checkName(target);
   if (isDeviceOrPipe(target)) {
     if (::access(target.c_str(), W_OK) != 0) refuse(target, errno);
     return;

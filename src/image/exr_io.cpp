@@ -210,7 +210,7 @@ void readPixels(Imf::InputPart& part, const Imath::Box2i& window, std::vector<Co
                                                   sizeof(Rgb) * static_cast<size_t>(width)));
   }
   part.setFrameBuffer(frame);
-  const int band = std::max(1, (1 << 20) / width);
+  const int band = std::max(1, (1 << 17) / width);
   for (int y = 0; y < height; y += band) {
     const int end = std::min(height, y + band);
     for (ColourGroup& g : groups) g.image.pixels.resize(static_cast<size_t>(width) * static_cast<size_t>(end));
@@ -257,12 +257,20 @@ Contents readContents(const std::string& name, std::string_view bytes, Wanted wa
   return out;
 }
 
-// The library's messages begin with the name of the file and often with a second one; a user wants the reason.
+// The library's messages repeat the name of the file, once or twice, before they come to the reason.
+std::string reasonOf(const std::string& name, const std::string& message) {
+  const std::string quoted = "\"" + name + "\"";
+  const size_t at = message.rfind(quoted);
+  if (at == std::string::npos) return message;
+  const size_t reason = message.find_first_not_of(".: ", at + quoted.size());
+  return reason == std::string::npos ? message : message.substr(reason);
+}
+
 Contents contents(const std::string& name, std::string_view bytes, Wanted wanted) {
   try {
     return readContents(name, bytes, wanted);
   } catch (const Iex::BaseExc& e) {
-    broken(name, fmt::format("the EXR is damaged or cut short ({})", e.what()));
+    broken(name, fmt::format("the EXR is damaged or cut short ({})", reasonOf(name, e.what())));
   }
 }
 

@@ -46,17 +46,19 @@ class Source {
 
   bool overrun() const { return overrun_; }
 
-  // stb fills its own small buffer ahead of need: a short answer there is no overrun yet. Any other buffer is filled on
-  // demand. Its own is the one it fills first.
+  // stb fills its own small buffer (the one it fills first) ahead of need: a short answer there is no overrun yet.
+  // Where it comes back for more, line feeds follow the end. Every decoder halts on them or makes progress: an empty
+  // line ends an HDR's header, as a count ten is no standstill in its pixels; no chunk of a PNG and no marker of a JPEG
+  // begins so.
   int read(char* data, size_t size) {
     if (ownBuffer_ == nullptr) ownBuffer_ = data;
     const size_t there = std::min(size, bytes_.size() - position_);
     std::memcpy(data, bytes_.data() + position_, there);
     position_ += there;
-    if (there == size || (there > 0 && data == ownBuffer_)) return static_cast<int>(there);
-    overrun_ = true;
-    // What follows the end is the end mark of a JPEG: every decoder comes to a stop on it or makes progress.
-    for (size_t i = there; i < size; ++i) data[i] = static_cast<char>((i - there) % 2 == 0 ? 0xff : 0xd9);
+    const bool ahead = data == ownBuffer_;
+    overrun_ |= there < size && (there == 0 || !ahead);
+    if (there > 0 || !ahead) return static_cast<int>(there);
+    std::memset(data, '\n', size);
     return static_cast<int>(size);
   }
 
