@@ -52,7 +52,8 @@ std::pair<int, int> imageSize(const std::string& text) {
   const auto height = x == std::string::npos ? std::nullopt : parsed<int>(std::string_view(text).substr(x + 1));
   if (!width || !height || *width < 1 || *height < 1) failValue("--size", text, "expected WIDTHxHEIGHT, like 640x360");
   if (*width > kMaxImageSide || *height > kMaxImageSide || int64_t{*width} * *height > kMaxImagePixels)
-    failValue("--size", text, fmt::format("more than {} pixels, or a side of more than {}", kMaxImagePixels, kMaxImageSide));
+    failValue("--size", text,
+              fmt::format("more than {} pixels, or a side of more than {}", kMaxImagePixels, kMaxImageSide));
   return {*width, *height};
 }
 
@@ -89,16 +90,19 @@ void addStopRules(CLI::App& app, StopRules& stop) {
   constexpr int64_t kMostPasses = int64_t{1} << 40;
   const char* group = "When to stop (at the first that is met; default: the scene's sample_count)";
   const auto passes = [&stop](const char* option) {
-    return [&stop, option](const std::string& text) { stop.passes = wholeNumber<int64_t>(option, text, 1, kMostPasses); };
+    return
+        [&stop, option](const std::string& text) { stop.passes = wholeNumber<int64_t>(option, text, 1, kMostPasses); };
   };
   CLI::Option* spp = addParsed(app, "--spp", passes("--spp"), "Samples a pixel; a pass of path is one", "N");
   spp->group(group);
   addParsed(app, "--passes", passes("--passes"), "Passes of the method", "N")->group(group)->excludes(spp);
-  addParsed(app, "--time", [&stop](const std::string& t) { stop.seconds = positive("--time", t); },
-            "Seconds of rendering", "SEC")
+  addParsed(
+      app, "--time", [&stop](const std::string& t) { stop.seconds = positive("--time", t); }, "Seconds of rendering",
+      "SEC")
       ->group(group);
-  addParsed(app, "--error", [&stop](const std::string& t) { stop.relMse = positive("--error", t); },
-            "Estimated relMSE of the picture", "RELMSE")
+  addParsed(
+      app, "--error", [&stop](const std::string& t) { stop.relMse = positive("--error", t); },
+      "Estimated relMSE of the picture", "RELMSE")
       ->group(group);
 }
 
@@ -106,13 +110,17 @@ Action addRender(CLI::App& app) {
   auto o = std::make_shared<RenderOptions>();
   addSceneOptions(app, o->scene, "SCENE", "Scene (.xml) or volume (.vdb, .nvdb, .vol)");
   app.add_option("-m,--method", o->method, "Method, see \"virga methods\"")->type_name("METHOD")->capture_default_str();
-  addRepeated(app, "-o,--output", o->outputs, "Picture, .exr (linear) or .png (tone mapped); give both by -o twice", "FILE");
+  addRepeated(app, "-o,--output", o->outputs, "Picture, .exr (linear) or .png (tone mapped); give both by -o twice",
+              "FILE");
   addStopRules(app, o->stop);
-  addParsed(app, "--size", [o](const std::string& t) { o->size = imageSize(t); }, "Size in place of the scene's", "WxH");
-  addParsed(app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint64_t>("--seed", t, 0, UINT64_MAX); },
-            "Seed of all randomness", "N");
-  addParsed(app, "--threads", [o](const std::string& t) { o->threads = wholeNumber("--threads", t, 1, 4096); },
-            "Threads; the picture does not depend on it", "N");
+  addParsed(
+      app, "--size", [o](const std::string& t) { o->size = imageSize(t); }, "Size in place of the scene's", "WxH");
+  addParsed(
+      app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint64_t>("--seed", t, 0, UINT64_MAX); },
+      "Seed of all randomness", "N");
+  addParsed(
+      app, "--threads", [o](const std::string& t) { o->threads = wholeNumber("--threads", t, 1, 4096); },
+      "Threads; the picture does not depend on it", "N");
   addRepeated(app, "--set", o->settings, "Parameter of the method; repeatable", "method.param=value");
   app.add_flag("--layers", o->layers, "Add all transport layers and the variances to the EXR");
   app.add_option("--stats", o->stats, "Write timings and counts as JSON")->type_name("FILE");
@@ -126,7 +134,8 @@ Action addCompare(CLI::App& app) {
   app.add_option("IMAGE", o->image, "Picture")->required()->type_name("");
   app.add_option("REFERENCE", o->reference, "Picture to hold it against")->required()->type_name("");
   app.add_option("--layer", o->layer, "Compare this layer of two EXRs, not the beauty")->type_name("LAYER");
-  app.add_option("--diff", o->difference, "Write the signed difference (green too dark, red too bright, x2)")->type_name("PNG");
+  app.add_option("--diff", o->difference, "Write the signed difference (green too dark, red too bright, x2)")
+      ->type_name("PNG");
   app.add_flag("--json", o->json, "Print JSON");
   return [o] { return compare(*o); };
 }
@@ -143,15 +152,19 @@ Action addMake(CLI::App& app) {
   app.add_option("-o,--output", o->output, "Volume (.vdb, .nvdb, .vol), or a scene (.xml) with its volume beside it")
       ->required()
       ->type_name("FILE");
-  app.add_option("--scene", o->scene, "Also write a scene with the volume, a light, a ground and a camera")->type_name("FILE.xml");
-  addParsed(app, "--resolution", [o](const std::string& t) { o->resolution = wholeNumber("--resolution", t, 4, 1024); },
-            "Voxels along the longest side", "N")
+  app.add_option("--scene", o->scene, "Also write a scene with the volume, a light, a ground and a camera")
+      ->type_name("FILE.xml");
+  addParsed(
+      app, "--resolution", [o](const std::string& t) { o->resolution = wholeNumber("--resolution", t, 2, 2048); },
+      "Voxels along each side", "N")
       ->default_str("128");
-  addParsed(app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint64_t>("--seed", t, 0, UINT64_MAX); },
-            "Seed of the shape", "N")
-      ->default_str("1");
-  addParsed(app, "--frames", [o](const std::string& t) { o->frames = wholeNumber("--frames", t, 1, 9999); },
-            "A sequence: name.0001.vdb, name.0002.vdb ...", "N");
+  addParsed(
+      app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint32_t>("--seed", t, 0, UINT32_MAX); },
+      "Seed of the shape", "N")
+      ->default_str("0");
+  addParsed(
+      app, "--frames", [o](const std::string& t) { o->frames = wholeNumber("--frames", t, 1, 9999); },
+      "A sequence: name.0001.vdb, name.0002.vdb ...", "N");
   return [o] { return make(*o); };
 }
 

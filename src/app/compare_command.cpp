@@ -67,10 +67,11 @@ nlohmann::ordered_json number(double value) {
 }
 
 std::string jsonText(const Metrics& m, const std::optional<Agreement>& t) {
-  nlohmann::ordered_json json = {{"mse", number(m.mse)},   {"relmse", number(m.relMse)},  {"mape", number(m.mape)},
-                                 {"psnr", number(m.psnr)}, {"bias", number(m.bias)},      {"excess", number(m.excess)},
-                                 {"max_abs", number(m.maxAbs)}, {"pixels", m.pixels},     {"non_finite", m.nonFinite},
-                                 {"reference_non_finite", m.referenceNonFinite}};
+  nlohmann::ordered_json json = {{"mse", number(m.mse)},        {"relmse", number(m.relMse)},
+                                 {"mape", number(m.mape)},      {"psnr", number(m.psnr)},
+                                 {"bias", number(m.bias)},      {"excess", number(m.excess)},
+                                 {"max_abs", number(m.maxAbs)}, {"pixels", m.pixels},
+                                 {"non_finite", m.nonFinite},   {"reference_non_finite", m.referenceNonFinite}};
   if (t)
     json["t_test"] = {{"tests", t->tests},
                       {"beyond_2", t->beyond2},
@@ -98,10 +99,11 @@ void printMetrics(const Metrics& m) {
 }
 
 void printAgreement(const Agreement& t) {
-  fmt::print("t-test  {} values: {:.2f} % beyond 2 (expected {:.2f} %), {:.3f} % beyond 3 (expected {:.3f} %)\n", t.tests,
-             100 * t.beyond2, 100 * t.expectedBeyond2, 100 * t.beyond3, 100 * t.expectedBeyond3);
-  fmt::print("        chi^2 per degree of freedom {:.4f}, largest |t| {:.2f} (p = {:.3g} for the most unlikely of all)\n",
-             t.chiSquaredPerDof, t.maximumT, t.maximumP);
+  fmt::print("t-test  {} values: {:.2f} % beyond 2 (expected {:.2f} %), {:.3f} % beyond 3 (expected {:.3f} %)\n",
+             t.tests, 100 * t.beyond2, 100 * t.expectedBeyond2, 100 * t.beyond3, 100 * t.expectedBeyond3);
+  fmt::print(
+      "        chi^2 per degree of freedom {:.4f}, largest |t| {:.2f} (p = {:.3g} for the most unlikely of all)\n",
+      t.chiSquaredPerDof, t.maximumT, t.maximumP);
   if (t.certain > 0) fmt::print("        {} values differ without noise on either side\n", t.certain);
 }
 

@@ -17,8 +17,8 @@ void printGrid(const GridInfo& g) {
   fmt::print("{}: {} of {}, {}\n", g.name.empty() ? "(unnamed)" : g.name, g.kind, g.valueType, g.format);
   if (!g.problem.empty()) fmt::print("  cannot be rendered: {}\n", g.problem);
   const auto size = [&g](size_t axis) { return g.activeVoxels == 0 ? 0 : g.indexHi[axis] - g.indexLo[axis] + 1; };
-  fmt::print("  voxels  {} x {} x {} from ({}, {}, {}), {} active\n", size(0), size(1), size(2), g.indexLo[0], g.indexLo[1],
-             g.indexLo[2], g.activeVoxels);
+  fmt::print("  voxels  {} x {} x {} from ({}, {}, {}), {} active\n", size(0), size(1), size(2), g.indexLo[0],
+             g.indexLo[1], g.indexLo[2], g.activeVoxels);
   fmt::print("  bounds  {} to {}\n", pointText(g.worldBounds.lo), pointText(g.worldBounds.hi));
   fmt::print("  values  {:g} to {:g}, mean {:g}\n", g.minimum, g.maximum, g.mean);
   fmt::print("  memory  {}\n", bytesText(static_cast<double>(g.bytes)));

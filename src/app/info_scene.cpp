@@ -84,14 +84,15 @@ void printCamera(const Scene& scene) {
     fmt::print(", at ({}, {}) of {} x {}", c.cropX, c.cropY, c.filmWidth, c.filmHeight);
   const Vec3 p = c.toWorld.translation, d = normalize(c.toWorld.z);
   constexpr float kDegrees = 360 / kPi;  // of a whole angle, from the radians of half of it
-  fmt::print("\ncamera: at ({:g}, {:g}, {:g}) toward ({:.3g}, {:.3g}, {:.3g}), {:.3g} x {:.3g} degrees, in {}\n", p.x, p.y, p.z,
-             d.x, d.y, d.z, kDegrees * std::atan(c.tanX), kDegrees * std::atan(c.tanY),
+  fmt::print("\ncamera: at ({:g}, {:g}, {:g}) toward ({:.3g}, {:.3g}, {:.3g}), {:.3g} x {:.3g} degrees, in {}\n", p.x,
+             p.y, p.z, d.x, d.y, d.z, kDegrees * std::atan(c.tanX), kDegrees * std::atan(c.tanY),
              scene.view.cameraMedia.vacuum() ? "vacuum" : "a medium");
 }
 
 void printIntegrator(const IntegratorHints& hints) {
   fmt::print("paths: {}, {} samples a pixel\n",
-             hints.maxDepth < 0 ? "of any length" : fmt::format("at most {} segments", hints.maxDepth), hints.sampleCount);
+             hints.maxDepth < 0 ? "of any length" : fmt::format("at most {} segments", hints.maxDepth),
+             hints.sampleCount);
 }
 
 void printShapes(const Scene& scene) {
@@ -105,8 +106,9 @@ void printShapes(const Scene& scene) {
 void printMemory(const Scene& scene) {
   size_t grids = 0;
   for (const auto& [key, grid] : scene.parts->cache.grids) grids += grid ? grid->bytes() : 0;
-  fmt::print("memory: {} of grids, {} of meshes\n", bytesText(static_cast<double>(grids)),
-             bytesText(static_cast<double>(meshBytes(scene.parts->surfaceShapes) + meshBytes(scene.parts->boundaryShapes))));
+  fmt::print(
+      "memory: {} of grids, {} of meshes\n", bytesText(static_cast<double>(grids)),
+      bytesText(static_cast<double>(meshBytes(scene.parts->surfaceShapes) + meshBytes(scene.parts->boundaryShapes))));
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "app/usage_error.h"
 #include "core/error.h"
 
@@ -22,16 +20,6 @@ Assignment parse(const std::string& text) {
   return {text.substr(0, dot), text.substr(dot + 1, equals - dot - 1), text.substr(equals + 1)};
 }
 
-void requireParameter(const MethodInfo& info, const std::string& name) {
-  std::vector<std::string> known;
-  for (const SettingInfo& s : info.settings) known.emplace_back(s.name);
-  if (std::find(known.begin(), known.end(), name) != known.end()) return;
-  throw Error(fmt::format("method \"{}\" has no parameter \"{}\"", info.name, name),
-              {.position = {},
-               .hint = didYouMean(name, known),
-               .notes = {known.empty() ? "it has none" : "available: " + joined(known)}});
-}
-
 }  // namespace
 
 Settings methodSettings(const MethodInfo& info, const std::vector<std::string>& assignments, uint64_t seed) {
@@ -40,7 +28,6 @@ Settings methodSettings(const MethodInfo& info, const std::vector<std::string>& 
     const Assignment a = parse(text);
     if (a.method != info.name)
       throw Error(fmt::format("--set {}: the method is \"{}\", not \"{}\"", text, info.name, a.method));
-    requireParameter(info, a.parameter);
     settings.values[a.parameter] = a.value;
   }
   return settings;

@@ -21,7 +21,8 @@ void listAll() {
 std::string layerNames(LayerMask mask) {
   std::string out;
   for (int i = 0; i < kLayerCount; ++i)
-    if (mask.has(static_cast<Layer>(i))) out += fmt::format("{}{}", out.empty() ? "" : " ", kLayerNames[static_cast<size_t>(i)]);
+    if (mask.has(static_cast<Layer>(i)))
+      out += fmt::format("{}{}", out.empty() ? "" : " ", kLayerNames[static_cast<size_t>(i)]);
   return out;
 }
 

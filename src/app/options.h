@@ -27,7 +27,7 @@ struct RenderOptions {
   StopRules stop;
   std::optional<std::pair<int, int>> size;
   uint64_t seed = 0;
-  int threads = 0;  ///< 0: as many as there are
+  int threads = 0;                    ///< 0: as many as there are
   std::vector<std::string> settings;  ///< "method.param=value"
   std::string stats;
   bool layers = false;
@@ -50,7 +50,7 @@ struct MakeOptions {
   std::string output;
   std::string scene;
   int resolution = 128;
-  uint64_t seed = 1;
+  uint32_t seed = 0;
   int frames = 0;  ///< 0: a single volume, without a number in its name
 };
 int make(const MakeOptions&);

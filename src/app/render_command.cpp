@@ -50,13 +50,14 @@ StopRules rulesFor(const RenderOptions& options, const Scene& scene) {
   return rules;
 }
 
-// The film holds a picture for each replicate and one for the pass in the making. To be refused here is better than to be
-// killed by the system for memory it promised and does not have.
+// The film holds a picture for each replicate and one for the pass in the making. To be refused here is better than to
+// be killed by the system for memory it promised and does not have.
 void requireMemory(const Scene& scene, LayerMask layers) {
   const double pixels = static_cast<double>(scene.camera.width) * scene.camera.height;
   const double planes = layers == LayerMask::none() ? 1 : kLayerCount;
   const double needed = pixels * sizeof(Rgb) * planes * (Film::kReplicates + 2);
-  const double available = static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
+  const double available =
+      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGESIZE));
   if (needed <= available) return;
   throw Error(fmt::format("a picture of {} x {} pixels needs {} of memory; this machine has {}", scene.camera.width,
                           scene.camera.height, bytesText(needed), bytesText(available)),
@@ -126,8 +127,9 @@ class RenderJob {
 
   void warnOfNonFinite(const Film& film) {
     if (film.nonFiniteSamples() == 0) return;
-    report_.warnings.push_back(fmt::format("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
-                                           film.nonFiniteSamples()));
+    report_.warnings.push_back(
+        fmt::format("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
+                    film.nonFiniteSamples()));
     say("warning: {}\n", report_.warnings.back());
   }
 

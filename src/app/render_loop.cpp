@@ -11,8 +11,9 @@ namespace {
 void requireEstimate(const RenderSession& session, const StopRules& rules, const RenderState& state) {
   if (!rules.relMse || rules.passes || rules.seconds) return;
   if (state.passes < kFewestPassesForError || state.relMse) return;
-  throw Error("--error: method \"" + std::string(session.info().name) + "\" gives no estimate of its error for this scene",
-              {.position = {}, .hint = "use --passes or --time", .notes = {}});
+  throw Error(
+      "--error: method \"" + std::string(session.info().name) + "\" gives no estimate of its error for this scene",
+      {.position = {}, .hint = "use --passes or --time", .notes = {}});
 }
 
 }  // namespace

@@ -15,8 +15,8 @@ struct LoopOutcome {
   bool biased = false;  ///< as the passes themselves said
 };
 
-/// Passes until a rule or `stop` ends it. The first pass is always completed, so that there is a picture; a later one that `stop`
-/// meets on its way does not count. `onState` is called before the first pass and after each.
+/// Passes until a rule or `stop` ends it. The first pass is always completed, so that there is a picture; a later one
+/// that `stop` meets on its way does not count. `onState` is called before the first pass and after each.
 LoopOutcome renderLoop(RenderSession&, const StopRules&, std::stop_token stop,
                        const std::function<void(const RenderState&)>& onState);
 

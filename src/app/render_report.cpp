@@ -32,7 +32,8 @@ Metadata metadata(const RenderSession& session, const LoopOutcome& outcome, cons
   m["virga.scene"] = sceneFile;
   m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
   m["virga.method"] = std::string(session.info().name);
-  for (const auto& [name, value] : effectiveSettings(session)) m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
+  for (const auto& [name, value] : effectiveSettings(session))
+    m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
   m["virga.seed"] = std::to_string(session.settings().seed);
   m["virga.passes"] = session.film().passes();
   m["virga.seconds"] = outcome.state.seconds;
@@ -55,7 +56,7 @@ void addLayers(const Film& film, LayeredImage& picture) {
 }
 
 Json timingsJson(const Timings& t) {
-  return {{"load", t.load},   {"build", t.build},           {"prepare", t.prepare},    {"render", t.render},
+  return {{"load", t.load},   {"build", t.build},          {"prepare", t.prepare},    {"render", t.render},
           {"write", t.write}, {"render_cpu", t.renderCpu}, {"total_cpu", t.totalCpu}, {"total", t.total}};
 }
 

@@ -15,7 +15,8 @@ namespace {
 
 const GridInfo& densityOf(const std::string& file, const std::vector<GridInfo>& grids) {
   const auto usable = [](const GridInfo& g) { return g.problem.empty(); };
-  const auto named = std::find_if(grids.begin(), grids.end(), [&](const GridInfo& g) { return usable(g) && g.name == "density"; });
+  const auto named =
+      std::find_if(grids.begin(), grids.end(), [&](const GridInfo& g) { return usable(g) && g.name == "density"; });
   if (named != grids.end()) return *named;
   const auto first = std::find_if(grids.begin(), grids.end(), usable);
   if (first != grids.end()) return *first;
@@ -43,7 +44,8 @@ SceneDescription sceneAroundVolume(const std::string& file) {
 
 SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>& warnings) {
   if (!isVolumeFile(options.file))
-    return loadMitsubaXml(options.file, {.defines = options.defines, .lenient = options.lenient, .warnings = &warnings});
+    return loadMitsubaXml(options.file,
+                          {.defines = options.defines, .lenient = options.lenient, .warnings = &warnings});
   if (!options.defines.empty())
     throw Error(fmt::format("-D has no meaning for \"{}\": a volume has no variables", options.file));
   return sceneAroundVolume(options.file);

@@ -12,7 +12,8 @@ namespace virga::app {
 /// A scene file, or a bare volume in a ready scene. Warnings are full texts. Throws Error.
 SceneDescription loadScene(const SceneOptions&, std::vector<std::string>& warnings);
 
-/// A ready scene around the volume: of several grids, "density" or the first that can be loaded. Throws Error where there is none.
+/// A ready scene around the volume: of several grids, "density" or the first that can be loaded. Throws Error where
+/// there is none.
 SceneDescription sceneAroundVolume(const std::string& file);
 
 /// ".vdb", ".nvdb" or ".vol".

@@ -27,11 +27,16 @@ std::optional<double> passesToError(double limit, const RenderState& state) {
 
 std::string_view stopReasonName(StopReason reason) {
   switch (reason) {
-    case StopReason::passes: return "passes";
-    case StopReason::time: return "time";
-    case StopReason::error: return "error";
-    case StopReason::converged: return "converged";
-    case StopReason::interrupted: return "interrupted";
+    case StopReason::passes:
+      return "passes";
+    case StopReason::time:
+      return "time";
+    case StopReason::error:
+      return "error";
+    case StopReason::converged:
+      return "converged";
+    case StopReason::interrupted:
+      return "interrupted";
   }
   return "";
 }

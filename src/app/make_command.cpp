@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+
+#include "app/options.h"
+#include "app/ready_scene.h"
+#include "app/usage_error.h"
+#include "image/atomic_write.h"
+#include "volume/procedural.h"
+#include "volume/volume_io.h"
+
+namespace virga::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Writer = void (*)(const fs::path&, const DenseVolume&);
+
+Writer writerFor(const fs::path& file) {
+  const std::string extension = file.extension().string();
+  if (extension == ".vol") return writeVol;
+  if (extension == ".vdb") return writeVdb;
+  if (extension == ".nvdb") return writeNvdb;
+  throw UsageError(fmt::format("\"{}\": volumes are written as .vdb, .nvdb or .vol, scenes as .xml", file.string()));
+}
+
+/// The files to make. The volume's name still lacks the number of its frame.
+struct Plan {
+  fs::path volume;
+  fs::path scene;  ///< empty: none
+};
+
+Plan planFor(const MakeOptions& options) {
+  Plan plan{options.output, options.scene};
+  if (plan.volume.extension() == ".xml") {
+    if (!options.scene.empty()) throw UsageError("--scene and an output that is a scene itself exclude each other");
+    plan = {fs::path(options.output).replace_extension(".vol"), options.output};
+  }
+  if (!plan.scene.empty() && plan.scene.extension() != ".xml")
+    throw UsageError(fmt::format("--scene {}: scenes are written as .xml", options.scene));
+  return plan;
+}
+
+fs::path numbered(const fs::path& file, int number) {
+  fs::path out = file;
+  return out.replace_extension(fmt::format(".{:04}{}", number, file.extension().string()));
+}
+
+void writeScene(const Plan& plan, const fs::path& firstVolume, bool isSequence) {
+  const fs::path folder = plan.scene.has_parent_path() ? plan.scene.parent_path() : fs::path(".");
+  const fs::path relative = fs::proximate(plan.volume, folder);
+  const ReadyScene scene{.volume = firstVolume, .nameInScene = relative, .isSequence = isSequence};
+  writeAtomically(plan.scene, readySceneXml(scene));
+  fmt::print(stderr, "wrote {}\n", plan.scene.string());
+}
+
+}  // namespace
+
+int make(const MakeOptions& options) {
+  const ProceduralKind kind = proceduralKind(options.kind);
+  const Plan plan = planFor(options);
+  const Writer write = writerFor(plan.volume);
+  const bool isSequence = options.frames > 0;
+  const auto fileOf = [&](int frame) { return isSequence ? numbered(plan.volume, frame + 1) : plan.volume; };
+  checkWritable(fileOf(0));
+  if (!plan.scene.empty()) checkWritable(plan.scene);
+  for (int frame = 0; frame < std::max(1, options.frames); ++frame) {
+    const ProceduralSettings settings{
+        .resolution = options.resolution, .seed = options.seed, .frame = static_cast<float>(frame)};
+    write(fileOf(frame), makeProcedural(kind, settings));
+    fmt::print(stderr, "wrote {}\n", fileOf(frame).string());
+  }
+  if (!plan.scene.empty()) writeScene(plan, fileOf(0), isSequence);
+  return 0;
+}
+
+}  // namespace virga::app
