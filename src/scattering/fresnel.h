@@ -15,9 +15,10 @@ struct DielectricFresnel {
 VIRGA_HD inline DielectricFresnel fresnelDielectric(float cosIncident, float eta) {
   const float relative = cosIncident >= 0 ? eta : 1 / eta;
   const float ci = std::fabs(cosIncident);
-  const float sin2 = (1 - ci * ci) / (relative * relative);
-  if (sin2 >= 1) return {1, 0, relative};
-  const float ct = std::sqrt(1 - sin2);
+  // Snell: cos^2 of the refracted ray, as a difference that is exact for equal indices and at grazing incidence.
+  const float ct2 = (ci * ci + (relative - 1) * (relative + 1)) / (relative * relative);
+  if (ct2 <= 0) return {1, 0, relative};
+  const float ct = std::sqrt(ct2);
   const float parallel = (relative * ci - ct) / (relative * ci + ct);
   const float perpendicular = (ci - relative * ct) / (ci + relative * ct);
   return {0.5f * (parallel * parallel + perpendicular * perpendicular), ct, relative};

@@ -28,20 +28,27 @@ struct HenyeyGreenstein {
   float g;
 
   VIRGA_HD float value(Vec3 wo, Vec3 wi) const {
-    // 1 + g^2 - 2 g c = (1 - g)^2 + 2 g (1 - c): no cancellation near the forward peak.
-    const float d = square(1 - g) + 2 * g * (1 + dot(wo, wi));
-    return kInv4Pi * (1 - g * g) / (d * std::sqrt(d));
+    // Half the squared distance of unit vectors is 1 - cos(angle), and keeps its digits where 1 + dot(wo, wi) is rounding error.
+    return atHeight(0.5f * lengthSquared(g < 0 ? wi - wo : wi + wo));
   }
   VIRGA_HD float pdf(Vec3 wo, Vec3 wi) const { return value(wo, wi); }
   VIRGA_HD PhaseSample sample(Vec3 wo, Vec2 u) const {
-    // v = 1 - cos(theta) about -wo: the textbook inverse with its 1/g cancelled by hand, so that g -> 0 is no special case.
-    const float r = (1 - g) / (1 - g + 2 * g * u.x);
-    const float v = 2 * (1 - u.x) * r * r * (1 + g * u.x);
+    // The textbook inverse with its 1/g cancelled by hand, so that g -> 0 is no special case.
+    const float a = std::fabs(g);
+    const float r = (1 - a) / (1 - a + 2 * a * u.x);
+    const float v = 2 * (1 - u.x) * r * r * (1 + a * u.x);
     const float sinTheta = std::sqrt(std::fmax(0.f, v * (2 - v)));
-    const Vec3 wi = Frame(-wo).toWorld(sphericalDirection(sinTheta, 1 - v, kTwoPi * u.y));
-    const float d = square(1 - g) + 2 * g * v;
-    const float p = kInv4Pi * (1 - g * g) / (d * std::sqrt(d));
+    const Vec3 wi = Frame(g < 0 ? wo : -wo).toWorld(sphericalDirection(sinTheta, 1 - v, kTwoPi * u.y));
+    const float p = atHeight(v);
     return {wi, p, p};
+  }
+
+ private:
+  // v = 1 - cos(angle to the peak). The peak lies ahead for g > 0 and behind for g < 0, of the same shape: taken from the peak,
+  // 1 + g^2 - 2 g cos(theta) = (1 - |g|)^2 + 2 |g| v does not cancel for either sign.
+  VIRGA_HD float atHeight(float v) const {
+    const float a = std::fabs(g), d = square(1 - a) + 2 * a * v;
+    return kInv4Pi * (1 - a * a) / (d * std::sqrt(d));
   }
 };
 
@@ -65,6 +72,16 @@ class PhaseFunction {
  public:
   enum class Kind : uint8_t { isotropic, henyeyGreenstein, cornetteShanks };
 
+  /// Calls f with the phase function that this is.
+  template <class F>
+  VIRGA_HD auto visit(F&& f) const {
+    switch (kind_) {
+      case Kind::henyeyGreenstein: return f(HenyeyGreenstein{g_});
+      case Kind::cornetteShanks: return f(CornetteShanks{g_});
+      default: return f(Isotropic{});
+    }
+  }
+
   PhaseFunction() = default;
   VIRGA_HD explicit PhaseFunction(Isotropic) {}
   VIRGA_HD explicit PhaseFunction(HenyeyGreenstein p) : kind_(Kind::henyeyGreenstein), g_(p.g) {}
@@ -84,15 +101,6 @@ class PhaseFunction {
   friend bool operator==(const PhaseFunction&, const PhaseFunction&) = default;
 
  private:
-  template <class F>
-  VIRGA_HD auto visit(F&& f) const {
-    switch (kind_) {
-      case Kind::henyeyGreenstein: return f(HenyeyGreenstein{g_});
-      case Kind::cornetteShanks: return f(CornetteShanks{g_});
-      default: return f(Isotropic{});
-    }
-  }
-
   Kind kind_ = Kind::isotropic;
   float g_ = 0;
 };
