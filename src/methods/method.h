@@ -38,7 +38,7 @@ struct PassResult {
   bool completed = true;          ///< false: stopped on the way; the frame does not count
   bool biased = false;            ///< expectation of the picture differs from the truth
   bool converged = false;         ///< more passes change nothing
-  std::optional<double> residual; ///< where the method has one: an estimate of the relative distance to its fixed point
+  std::optional<double> residual = std::nullopt;  ///< where the method has one: an estimate of the relative distance to its fixed point
 };
 
 /// Things to draw over the picture: virtual lights, samples, particles.

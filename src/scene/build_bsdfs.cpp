@@ -82,7 +82,7 @@ constexpr PluginRow<Build> kBsdfs[] = {
 Bsdf buildOneSided(BuildContext& context, const Node& node) {
   const Build build = findPlugin(node, kBsdfs, kNotYet);
   PluginReader reader(node, context.diagnostics);
-  if (!build) reader.fail(fmt::format("bsdf \"{}\" has no place in a twosided one", node.type));
+  if (!build) reader.failHere(fmt::format("bsdf \"{}\" has no place in a twosided one", node.type));
   const Bsdf bsdf = build(reader);
   reader.finish();
   return bsdf;
@@ -92,9 +92,9 @@ SurfaceBsdf buildTwoSided(BuildContext& context, const Node& node) {
   PluginReader reader(node, context.diagnostics);
   const std::vector<NodePtr> sides = reader.children("bsdf");
   reader.finish();
-  if (sides.empty() || sides.size() > 2) reader.fail("a twosided bsdf holds one or two others");
+  if (sides.empty() || sides.size() > 2) reader.failHere("a twosided bsdf holds one or two others");
   const SurfaceBsdf result{buildOneSided(context, *sides.front()), buildOneSided(context, *sides.back()), true};
-  if (result.front.transmits() || result.back.transmits()) reader.fail("only bsdfs that reflect can be made twosided");
+  if (result.front.transmits() || result.back.transmits()) reader.failHere("only bsdfs that reflect can be made twosided");
   return result;
 }
 

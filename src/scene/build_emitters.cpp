@@ -150,12 +150,12 @@ void buildEmitter(BuildContext& context, const Node& node) {
                                                    {"envmap", buildEnvironment}, {"area", nullptr}};
   const Build build = findPlugin(node, kEmitters, kNotYet);
   PluginReader reader(node, context.diagnostics);
-  if (!build) reader.fail("an area emitter belongs inside a shape");
+  if (!build) reader.failHere("an area emitter belongs inside a shape");
   const EmitterView emitter = build(context, reader);
   reader.ignore("sampling_weight");
   reader.finish();
   if (emitter.kind == EmitterView::Kind::constant || emitter.kind == EmitterView::Kind::environment) {
-    if (context.scene.view.environment >= 0) reader.fail("the scene has a second environment", "keep one constant or envmap emitter");
+    if (context.scene.view.environment >= 0) reader.failHere("the scene has a second environment", "keep one constant or envmap emitter");
     context.scene.view.environment = static_cast<int>(context.parts.emitters.size());
   }
   context.parts.emitters.push_back(emitter);

@@ -93,7 +93,7 @@ VolumeField buildGridVolume(BuildContext& context, PluginReader& reader, VolumeU
 }
 
 VolumeField buildVdb(BuildContext& context, PluginReader& reader, VolumeUse use) {
-  if (use == VolumeUse::albedo) reader.fail("a vdb volume for \"albedo\" is not supported yet", "use a gridvolume");
+  if (use == VolumeUse::albedo) reader.failHere("a vdb volume for \"albedo\" is not supported yet", "use a gridvolume");
   const std::filesystem::path path = context.file(reader, "filename");
   const std::string grid = reader.text("grid", "");
   VolumeField field;
@@ -184,7 +184,7 @@ MediumView readMedium(BuildContext& context, PluginReader& reader) {
 MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
   const MediumView medium = readMedium(context, reader);
   if (!medium.homogeneous || medium.albedoGrid.values)
-    reader.fail("a homogeneous medium cannot have a grid", "use type=\"heterogeneous\"");
+    reader.failHere("a homogeneous medium cannot have a grid", "use type=\"heterogeneous\"");
   return medium;
 }
 

@@ -114,7 +114,7 @@ void readFieldOfView(PluginReader& reader, PerspectiveCamera& camera) {
   if (byLength && reader.has("fov")) reader.fail("fov", "give either \"fov\" or \"focal_length\", not both");
   const auto axis = static_cast<FovAxis>(reader.oneOf("fov_axis", "x", kFovAxes));
   if (byLength) return setFieldOfView(camera, fovOfFocalLength(reader), FovAxis::diagonal);
-  if (!reader.has("fov")) reader.fail("a perspective sensor needs \"fov\" or \"focal_length\"");
+  if (!reader.has("fov")) reader.failHere("a perspective sensor needs \"fov\" or \"focal_length\"");
   setFieldOfView(camera, reader.number("fov", 0, {.lo = 0, .hi = 180, .openLo = true, .openHi = true}), axis);
 }
 

@@ -138,7 +138,7 @@ std::shared_ptr<const BuiltShape> geometry(BuildContext& context, PluginReader& 
   } else {
     shape->view.orientation = reader.boolean("flip_normals", false) ? -1.f : 1.f;
     build(context, reader, role, *shape);
-    if (!(shape->area > 0)) reader.fail("the shape has no area");
+    if (!(shape->area > 0)) reader.failHere("the shape has no area");
   }
   return context.cached<BuiltShape>(&PartCache::shapes, key, [&] { return shape; });
 }
@@ -169,7 +169,7 @@ void buildShape(BuildContext& context, const Node& node) {
   PluginReader reader(node, context.diagnostics);
   const NodePtr bsdf = reader.child("bsdf"), emitter = reader.child("emitter");
   const bool null = bsdf && isNullBsdf(*bsdf);
-  if (null && emitter) reader.fail("an area emitter on a shape with a null bsdf is not supported yet");
+  if (null && emitter) reader.failHere("an area emitter on a shape with a null bsdf is not supported yet");
   auto shape = geometry(context, reader, null ? Role::boundary : Role::surface);
   MediumTransition media = mediaOf(context, reader);
   reader.finish();

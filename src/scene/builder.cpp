@@ -107,7 +107,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   for (const NodePtr& bsdf : reader.children("bsdf")) buildBsdf(context, *bsdf);
   for (const NodePtr& medium : reader.children("medium")) buildMedium(context, *medium);
   const NodePtr sensor = onlyChild(reader, "sensor");
-  if (!sensor) reader.fail("the scene has no sensor", "add a <sensor type=\"perspective\">");
+  if (!sensor) reader.failHere("the scene has no sensor", "add a <sensor type=\"perspective\">");
   buildSensor(context, *sensor);
   reader.finish();
 

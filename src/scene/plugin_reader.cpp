@@ -56,7 +56,7 @@ void PluginReader::fail(std::string_view parameter, std::string message, std::st
   throw Error(std::move(message), {positionOf(parameter), std::move(hint), std::move(notes)});
 }
 
-void PluginReader::fail(std::string message, std::string hint, std::vector<std::string> notes) {
+void PluginReader::failHere(std::string message, std::string hint, std::vector<std::string> notes) {
   fail("", std::move(message), std::move(hint), std::move(notes));
 }
 

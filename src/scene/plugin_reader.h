@@ -60,10 +60,11 @@ class PluginReader {
   void ignore(std::string_view name) { (void)find(name); }
   void ignoreChildren(std::string_view tag) { (void)children(tag); }
 
-  /// An error about a parameter's value (or about the plugin, where the parameter is absent).
+  /// An error about a parameter's value (or at the plugin, where the parameter is absent).
   [[noreturn]] void fail(std::string_view parameter, std::string message, std::string hint = "",
                          std::vector<std::string> notes = {});
-  [[noreturn]] void fail(std::string message, std::string hint = "", std::vector<std::string> notes = {});
+  /// An error about the plugin as a whole.
+  [[noreturn]] void failHere(std::string message, std::string hint = "", std::vector<std::string> notes = {});
   /// Where a parameter's value stands.
   SourcePosition positionOf(std::string_view parameter) const;
 
