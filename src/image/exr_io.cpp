@@ -26,6 +26,7 @@ namespace virga::formats {
 namespace {
 
 constexpr char kMagic[] = {0x76, 0x2f, 0x31, 0x01};
+constexpr uint64_t kMaxTilePixels = uint64_t{1} << 24;  // the library allocates a whole tile before it reads one
 constexpr const char* kVariance = "variance";
 
 // ---- Files in memory ------------------------------------------------------------------------------------------------
@@ -224,6 +225,11 @@ void readPixels(Imf::InputPart& part, const Imath::Box2i& window, std::vector<Co
 void checkReadable(const std::string& name, const Imf::Header& header, const std::vector<ColourGroup>& groups) {
   const Imath::Box2i& window = header.dataWindow();
   checkSize(name, int64_t{window.max.x} - window.min.x + 1, int64_t{window.max.y} - window.min.y + 1);
+  if (header.hasTileDescription()) {
+    const Imf::TileDescription& tile = header.tileDescription();
+    if (uint64_t{tile.xSize} * tile.ySize > kMaxTilePixels)
+      broken(name, fmt::format("the EXR is damaged: its tiles have {} x {} pixels", tile.xSize, tile.ySize));
+  }
   for (const ColourGroup& g : groups)
     for (const std::string& channel : g.channel) {
       const Imf::Channel& c = header.channels()[channel];
