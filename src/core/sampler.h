@@ -54,16 +54,14 @@ class Sampler {
 
   VIRGA_HD Vec2 next2D() {
     const uint32_t pair = hashCombine(scramble_, ++pair_);
-    const uint32_t shuffled = owenScramble(reverseBits(index_), hash32(pair ^ 0x68bc21ebu));
-    // `shuffled` holds the bits of the shuffled index in reverse: it is the first Sobol coordinate already.
-    const uint32_t x = owenScramble(shuffled, hash32(pair ^ 0x02e5be93u));
-    const uint32_t y = owenScramble(sobolSecond(reverseBits(shuffled)), hash32(pair ^ 0x967a889bu));
+    const uint32_t shuffled = shuffledIndex(pair);
+    const uint32_t x = owenScramble(reverseBits(shuffled), hash32(pair ^ 0x02e5be93u));
+    const uint32_t y = owenScramble(sobolSecond(shuffled), hash32(pair ^ 0x967a889bu));
     return {toUnitFloat(x), toUnitFloat(y)};
   }
   VIRGA_HD float next1D() {
     const uint32_t pair = hashCombine(scramble_, ++pair_);
-    const uint32_t shuffled = owenScramble(reverseBits(index_), hash32(pair ^ 0x68bc21ebu));
-    return toUnitFloat(owenScramble(shuffled, hash32(pair ^ 0x02e5be93u)));
+    return toUnitFloat(owenScramble(reverseBits(shuffledIndex(pair)), hash32(pair ^ 0x02e5be93u)));
   }
   VIRGA_HD float random() { return rng_.next(); }
   VIRGA_HD Vec2 random2D() {
@@ -73,6 +71,10 @@ class Sampler {
   VIRGA_HD Pcg32& stream() { return rng_; }
 
  private:
+  // A bit of the result depends on higher bits of the index only, so an aligned block of indices becomes another aligned
+  // block and stays a (0,2)-net. (Were it the lower bits, the second coordinate would lose its strata.)
+  VIRGA_HD uint32_t shuffledIndex(uint32_t pair) const { return owenScramble(index_, hash32(pair ^ 0x68bc21ebu)); }
+
   static constexpr uint64_t kReplicateStride = 0x9e3779b97f4a7c15ull;
   uint32_t index_, scramble_, pair_ = 0;
   Pcg32 rng_;
