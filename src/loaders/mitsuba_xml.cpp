@@ -49,7 +49,7 @@ class Loader {
       : variables_(options.defines), complaints_(options.lenient, options.warnings) {}
 
   SceneDescription load(const std::shared_ptr<const SourceFile>& file, const fs::path& directory) {
-    sceneDirectory_ = fs::absolute(directory).lexically_normal();
+    sceneDirectory_ = fs::absolute(directory.empty() ? fs::path(".") : directory).lexically_normal();
     xml::Element root = xml::parse(file);
     if (root.name != "scene")
       throw errorAt(root.position, fmt::format("the root element is {}", tagOf(root)),
