@@ -43,7 +43,7 @@ class Discrete {
   double total() const { return total_; }
 
  private:
-  std::vector<float> cdf_;
+  std::vector<float> cdf_ = {0.f};
   double total_ = 0;
 };
 

@@ -97,7 +97,8 @@ Error Error::at(const SourcePosition& position) const {
 
 std::string nearest(std::string_view word, const std::vector<std::string>& known) {
   std::string best;
-  size_t bestDistance = std::max<size_t>(2, word.size() / 3) + 1;
+  // Some letter at least must be kept: else every word of two letters is near every other.
+  size_t bestDistance = std::min(std::max<size_t>(2, word.size() / 3) + 1, word.size());
   for (const std::string& candidate : known) {
     const size_t d = editDistance(word, candidate);
     if (d < bestDistance) bestDistance = d, best = candidate;
