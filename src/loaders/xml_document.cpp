@@ -32,8 +32,6 @@ const char* complaint(pugi::xml_parse_status status) {
       return "malformed attribute";
     case pugi::status_bad_end_element:
       return "malformed end tag";
-    case pugi::status_end_element_mismatch:
-      return "this end tag does not match the element that is open here";
     default:
       return "malformed XML";
   }
@@ -102,11 +100,67 @@ class Converter {
   std::shared_ptr<const SourceFile> file_;
 };
 
+// Behind the start tag whose name is at `at`, where a '>' within quotes does not end it.
+size_t tagEnd(std::string_view text, size_t at) {
+  while (at < text.size() && text[at] != '>') {
+    if (text[at] == '"' || text[at] == '\'') at = std::min(text.find(text[at], at + 1), text.size() - 1);
+    ++at;
+  }
+  return at;
+}
+
+// The elements that are open at the end of `text`, as offsets of their names. pugixml has accepted the text so far.
+std::vector<size_t> openElements(std::string_view text) {
+  std::vector<size_t> open;
+  size_t at = text.find('<');
+  while (at < text.size()) {
+    const std::string_view rest = text.substr(at);
+    std::string_view end = ">";
+    if (rest.starts_with("<!--")) {
+      end = "-->";
+    } else if (rest.starts_with("<![CDATA[")) {
+      end = "]]>";
+    } else if (rest.starts_with("<?")) {
+      end = "?>";
+    } else if (rest.starts_with("</")) {
+      if (rest.find('>') != rest.npos && !open.empty()) open.pop_back();
+    } else if (!rest.starts_with("<!")) {
+      const size_t close = tagEnd(text, at + 1);
+      if (text[close - 1] != '/') open.push_back(at + 1);
+      at = close;
+    }
+    at = text.find(end, at);
+    if (at != text.npos) at = text.find('<', at + 1);
+  }
+  return open;
+}
+
+std::string_view nameAt(std::string_view text, size_t offset) {
+  return text.substr(offset, text.find_first_of(" \t\r\n/>", offset) - offset);
+}
+
+Error mismatch(const std::shared_ptr<const SourceFile>& file, size_t offset) {
+  const std::string_view text = file->text;
+  const std::vector<size_t> open = openElements(text.substr(0, offset));
+  std::string inner;
+  if (!open.empty()) {
+    const SourcePosition start{file, open.back(), 1};
+    inner = fmt::format("<{}> of line {}", nameAt(text, open.back()), start.line());
+  }
+  if (!text.substr(0, offset).ends_with("</"))
+    return errorAt({file, text.size() - 1, 1}, "the file ends inside " + inner);
+  const std::string_view name = nameAt(text, offset);
+  std::string message = fmt::format("</{}> closes nothing", name);
+  if (!inner.empty()) message += fmt::format(": {} is open", inner);
+  return errorAt({file, offset, name.size()}, std::move(message));
+}
+
 void requireText(const std::shared_ptr<const SourceFile>& file) {
   const std::string& text = file->text;
   const size_t start = text.find_first_not_of(kBlanks);
   if (start == std::string::npos) throw Error(fmt::format("cannot read \"{}\": the file is empty", file->name));
-  if (text.find('\0') != std::string::npos) throw Error(fmt::format("cannot read \"{}\": this is a binary file, not XML", file->name));
+  if (text.find('\0') != std::string::npos)
+    throw Error(fmt::format("cannot read \"{}\": this is a binary file, not XML", file->name));
   if (text[start] != '<')
     throw errorAt({file, start, 1}, "this is not XML", "a scene starts with <scene version=\"3.0.0\">");
 }
@@ -127,7 +181,9 @@ Element parse(const std::shared_ptr<const SourceFile>& given) {
   const pugi::xml_parse_result result = document.load_buffer(
       file->text.data(), file->text.size(), pugi::parse_default | pugi::parse_fragment, pugi::encoding_utf8);
   const Converter converter(file);
-  if (!result) throw errorAt(converter.at(static_cast<size_t>(result.offset), 1), complaint(result.status));
+  const auto offset = static_cast<size_t>(result.offset);
+  if (result.status == pugi::status_end_element_mismatch) throw mismatch(file, offset);
+  if (!result) throw errorAt(converter.at(offset, 1), complaint(result.status));
   return converter.root(document);
 }
 

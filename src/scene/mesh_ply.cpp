@@ -262,12 +262,11 @@ class BodyReader {
                                element.count, element.name));
   }
 
-  static size_t slotOf(const std::string& name) {
-    constexpr std::array<std::string_view, 8> kNames{"x", "y", "z", "nx", "ny", "nz", "u", "v"};
-    const std::string_view word = name == "s" || name == "texture_u"   ? "u"
-                                  : name == "t" || name == "texture_v" ? "v"
-                                                                       : name;
-    return static_cast<size_t>(std::find(kNames.begin(), kNames.end(), word) - kNames.begin());
+  static size_t slotOf(std::string_view name) {
+    constexpr std::array<std::string_view, kIgnore> kNames{"x", "y", "z", "nx", "ny", "nz", "u", "v"};
+    if (name == "s" || name == "texture_u") name = "u";
+    if (name == "t" || name == "texture_v") name = "v";
+    return static_cast<size_t>(std::find(kNames.begin(), kNames.end(), name) - kNames.begin());
   }
 
   void readVertices(const PlyElement& element) {
