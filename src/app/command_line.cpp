@@ -125,7 +125,8 @@ Action addRender(CLI::App& app) {
   app.add_flag("--layers", o->layers, "Add all transport layers and the variances to the EXR");
   app.add_option("--stats", o->stats, "Write timings and counts as JSON")->type_name("FILE");
   app.add_flag("-q,--quiet", o->quiet, "Print nothing but errors");
-  app.footer("Ctrl-C writes the picture as it is then (after the first pass, if need be); a second one quits at once.");
+  app.footer(
+      "Ctrl-C writes the picture as it is then (after the first pass, if need be); a second one quits at once.\n");
   return [o] { return render(*o); };
 }
 
@@ -208,20 +209,22 @@ std::string optionName(const std::string& argument) {
 }
 
 // The parser's own message about an unknown option lacks a suggestion and comes after those about what is missing.
-void requireKnownOptions(CLI::App& command, int argc, char** argv) {
+void requireKnownOptions(CLI::App& command, int first, int argc, char** argv) {
   std::vector<std::string> known;
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
     for (const std::string& name : option->get_snames()) known.push_back("-" + name);
   }
-  for (int i = 2; i < argc; ++i) {
+  for (int i = first; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--") return;
-    if (argument.size() < 2 || argument[0] != '-') continue;
+    const bool isNumber = argument.size() >= 2 && argument[1] >= '0' && argument[1] <= '9';
+    if (argument.size() < 2 || argument[0] != '-' || isNumber) continue;
     const std::string name = optionName(argument);
     if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    const std::string program = first == 1 ? "virga" : "virga " + command.get_name();
     throw UsageError(withSuggestion(fmt::format("unknown option \"{}\"", name), name, known) +
-                     fmt::format("\n  note: \"virga {} --help\" lists the options", command.get_name()));
+                     fmt::format("\n  note: \"{} --help\" lists the options", program));
   }
 }
 
@@ -230,7 +233,7 @@ void describeProgram(CLI::App& app) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 done, 1 bad input, 2 wrong usage, 130 interrupted without a picture.\n"
-      "\"virga COMMAND --help\" lists the options of a command.");
+      "\"virga COMMAND --help\" lists the options of a command.\n");
 }
 
 void parse(CLI::App& app, int argc, char** argv) {
@@ -260,7 +263,9 @@ int runCommandLine(int argc, char** argv) {
   }
   if (argv[1][0] != '-') {
     requireKnownCommand(argv[1]);
-    requireKnownOptions(*app.get_subcommand(argv[1]), argc, argv);
+    requireKnownOptions(*app.get_subcommand(argv[1]), 2, argc, argv);
+  } else {
+    requireKnownOptions(app, 1, argc, argv);
   }
   try {
     parse(app, argc, argv);

@@ -103,6 +103,8 @@ class RenderJob {
   void renderPasses(RenderSession& session) {
     const StopRules rules = rulesFor(options_, session.scene());
     Progress progress(options_.quiet ? Progress::Mode::silent : Progress::automatic(), rules);
+    say("rendering {}: {} x {} pixels, {}, {} thread{}\n", report_.sceneFile, session.film().width(),
+        session.film().height(), method_.name, report_.threads, report_.threads == 1 ? "" : "s");
     const double cpuBefore = cpuSeconds();
     report_.outcome = renderLoop(session, rules, interrupt_.token(), [&](const RenderState& s) { progress.show(s); });
     report_.timings.render = report_.outcome.state.seconds;

@@ -25,6 +25,21 @@ const GridInfo& densityOf(const std::string& file, const std::vector<GridInfo>& 
   throw Error(fmt::format("\"{}\" has no grid that can be rendered", file), std::move(details));
 }
 
+// A `.vol` has no inactive voxels, so its listed mean is one over empty space as well.
+float meanOfNonZero(const std::string& volFile) {
+  const std::shared_ptr<const Grid> grid = loadVolume(volFile);
+  const DenseGridView& dense = grid->view().dense;
+  if (grid->view().kind != GridView::Kind::dense) return 0;
+  double sum = 0;
+  int64_t count = 0;
+  const int64_t voxels = int64_t{dense.nx} * dense.ny * dense.nz;
+  for (int64_t i = 0; i < voxels; ++i) {
+    sum += static_cast<double>(dense.values[i]);
+    count += dense.values[i] != 0 ? 1 : 0;
+  }
+  return count == 0 ? 0 : static_cast<float>(sum / static_cast<double>(count));
+}
+
 }  // namespace
 
 bool isVolumeFile(const std::string& path) {
@@ -35,11 +50,12 @@ bool isVolumeFile(const std::string& path) {
 SceneDescription sceneAroundVolume(const std::string& file) {
   const std::vector<GridInfo> grids = listGrids(file);
   const GridInfo& density = densityOf(file, grids);
+  const bool isVol = std::filesystem::path(file).extension() == ".vol";
   return describeBareVolume({.file = file,
                              .grid = grids.size() > 1 ? density.name : "",
                              .worldBounds = density.worldBounds,
                              .maximumDensity = density.maximum,
-                             .meanDensity = density.mean});
+                             .meanDensity = isVol ? meanOfNonZero(file) : density.mean});
 }
 
 SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>& warnings) {

@@ -9,9 +9,9 @@ namespace virga::app {
 
 /// When a render ends: at whichever of these comes first.
 struct StopRules {
-  std::optional<int64_t> passes;
-  std::optional<double> seconds;  ///< of rendering: scene loading and writing do not count
-  std::optional<double> relMse;   ///< estimated, of the beauty
+  std::optional<int64_t> passes{};
+  std::optional<double> seconds{};  ///< of rendering: scene loading and writing do not count
+  std::optional<double> relMse{};   ///< estimated, of the beauty
 
   bool any() const { return passes || seconds || relMse; }
 };
@@ -27,8 +27,8 @@ struct RenderState {
   double seconds = 0;
   bool converged = false;
   bool interrupted = false;
-  std::optional<double> relMse;  ///< latest estimate
-  int64_t relMsePasses = 0;      ///< passes that the estimate is made of
+  std::optional<double> relMse{};  ///< latest estimate
+  int64_t relMsePasses = 0;        ///< passes that the estimate is made of
 };
 
 /// Passes before which an estimated error stops nothing: two in each of the film's 8 replicates.
