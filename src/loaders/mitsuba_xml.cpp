@@ -32,6 +32,12 @@ fs::path identity(const fs::path& path) {
   return error ? path.lexically_normal() : canonical;
 }
 
+// Without the slash that "." and "folder/" leave behind, so that equal folders compare equal.
+fs::path folderIn(const fs::path& base, const fs::path& folder) {
+  const fs::path normal = (base / folder).lexically_normal();
+  return normal.has_filename() ? normal : normal.parent_path();
+}
+
 bool contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
@@ -49,7 +55,7 @@ class Loader {
       : variables_(options.defines), complaints_(options.lenient, options.warnings) {}
 
   SceneDescription load(const std::shared_ptr<const SourceFile>& file, const fs::path& directory) {
-    sceneDirectory_ = fs::absolute(directory.empty() ? fs::path(".") : directory).lexically_normal();
+    sceneDirectory_ = folderIn(fs::current_path(), directory);
     xml::Element root = xml::parse(file);
     if (root.name != "scene")
       throw errorAt(root.position, fmt::format("the root element is {}", tagOf(root)),
@@ -216,7 +222,7 @@ class Loader {
   void readPath(const xml::Element& element, const FileContext& context) {
     const Attributes attributes = read(element, {"value"});
     const Argument& value = attributes.required("value");
-    const fs::path path = (context.directory / value.text).lexically_normal();
+    const fs::path path = folderIn(context.directory, value.text);
     std::error_code error;
     if (!fs::is_directory(path, error))
       complaints_.unknown(

@@ -307,6 +307,17 @@ TEST(Includes, ComeFromSearchPathsTheLatestFirst) {
   EXPECT_EQ(parse(toXml(d)).searchPaths.front(), d.searchPaths.front());
 }
 
+TEST(Includes, TheSceneFolderIsAbsoluteHoweverItIsNamed) {
+  const TemporaryFolder folder;
+  folder.write("scene.xml", scene("<path value='./'/>"));
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  for (const char* name : {"scene.xml", "./scene.xml"})
+    EXPECT_EQ(loadMitsubaXml(name).searchPaths, std::vector<std::filesystem::path>{folder.path()}) << name;
+  EXPECT_EQ(parseMitsubaXml(scene(""), "text", "").searchPaths, std::vector<std::filesystem::path>{folder.path()});
+  std::filesystem::current_path(before);
+}
+
 TEST(Includes, Errors) {
   const TemporaryFolder folder;
   const auto message = [&](const std::string& body) {
