@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// White furnace: with albedo 1, reflectance 1 and a constant environment of 1, radiance is 1 everywhere.
+#include <gtest/gtest.h>
+
+#include "methods/rendering.h"
+
+namespace virga {
+namespace {
+
+using namespace virga::testing;
+
+constexpr const char* kSensor = R"(<sensor type="perspective"><float name="fov" value="50"/>
+  <transform name="to_world"><lookat origin="0.3, 1, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+  <film type="hdrfilm"><integer name="width" value="48"/><integer name="height" value="48"/></film></sensor>
+  <emitter type="constant"><rgb name="radiance" value="1"/></emitter>)";
+
+std::string cloud(const std::string& albedo, const std::string& g = "0.7") {
+  return R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
+    <float name="albedo" value=")" + albedo + R"("/><phase type="hg"><float name="g" value=")" + g + R"("/></phase></medium></shape>)";
+}
+
+// Mean radiance, to within its standard error.
+stats::Moments furnace(const std::string& elements, int passes = 64) {
+  return pixelMoments(rendered(sceneOf(kSensor + elements), {.passes = passes}).film().beauty());
+}
+
+void expectWhite(const std::string& elements) {
+  const stats::Moments m = furnace(elements);
+  EXPECT_NEAR(m.mean(), 1, std::max(4 * m.standardError(), 1e-5)) << elements;
+  EXPECT_LT(m.standardError(), 4e-3) << "too few samples to tell";
+}
+
+TEST(Furnace, EmptySceneIsWhite) { expectWhite(""); }
+TEST(Furnace, MediumIsWhite) { expectWhite(cloud("1")); }
+TEST(Furnace, BackwardMediumIsWhite) { expectWhite(cloud("1", "-0.8")); }
+TEST(Furnace, CornetteShanksIsWhite) {
+  expectWhite(R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
+    <float name="albedo" value="1"/><phase type="cornette_shanks"><float name="g" value="0.5"/></phase></medium></shape>)");
+}
+TEST(Furnace, DiffuseObjectsAreWhite) {
+  expectWhite(R"(<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>
+    <shape type="disk"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/><translate y="-1"/></transform>
+    <bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>)");
+}
+TEST(Furnace, GlassAndMirrorAreWhite) {
+  expectWhite(R"(<shape type="sphere"><transform name="to_world"><translate x="-0.8"/></transform><bsdf type="dielectric"/></shape>
+    <shape type="sphere"><point name="center" x="1.2" y="0" z="0"/><bsdf type="conductor"><string name="material" value="none"/>
+    </bsdf></shape>)");
+}
+TEST(Furnace, ObjectsInMediumAreWhite) {
+  expectWhite(cloud("1") + R"(<shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse">
+    <rgb name="reflectance" value="1"/></bsdf></shape><shape type="sphere"><float name="radius" value="0.3"/>
+    <point name="center" x="0.6" y="0.6" z="0.6"/><bsdf type="dielectric"/></shape>)");
+}
+TEST(Furnace, LessThanWhiteIsNoticed) {
+  const stats::Moments m = furnace(cloud("0.99"));
+  EXPECT_LT(m.mean(), 1 - 4 * m.standardError());
+}
+
+}  // namespace
+}  // namespace virga
