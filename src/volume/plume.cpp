@@ -9,11 +9,11 @@ namespace {
 
 constexpr float kSourceY = -0.93f;
 constexpr float kSourceRadius = 0.085f;
-constexpr float kSpread = 0.21f;        // dR/dy
-constexpr float kReach = 2.1f;          // |q| beyond which the air is clear
-constexpr float kTimePerFrame = 0.07f;  // [R / speed]
-constexpr float kFirstFront = 6.9f;     // zeta of the plume's head at frame 0
-constexpr float kMemory = 3.4f;         // life of an eddy [R / speed]
+constexpr float kSpread = 0.21f;         // dR/dy
+constexpr float kReach = 2.1f;           // |q| beyond which the air is clear
+constexpr float kTimePerFrame = 0.035f;  // [R / speed]
+constexpr float kFirstFront = 6.9f;      // zeta of the plume's head at frame 0
+constexpr float kMemory = 3.4f;          // life of an eddy [R / speed]
 constexpr int kSteps = 8;
 
 }  // namespace

@@ -166,12 +166,27 @@ class VdbReader : private openvdb::io::Archive {
     stream_.seekg(static_cast<std::streamoff>(entry.descriptorAt));
     openvdb::GridBase::Ptr grid = descriptor.read(stream_);
     if (hasOffsets_) descriptor.seekToGrid(stream_);
-    readGrid(grid, descriptor, stream_);
+    readGridCompression(stream_);
+    openvdb::io::setGridBackgroundValuePtr(stream_, nullptr);
+    grid->readMeta(stream_);
+    openvdb::io::setGridClass(stream_, grid->getGridClass());
+    grid->readTransform(stream_);
+    if (entry.parent.empty()) readTree(*grid);
     if (!entry.parent.empty()) grid->setTree(read(parentOf(entry))->baseTreePtr());
     return grid;
   }
 
  private:
+  // OpenVDB would print a warning about a damaged count of buffers.
+  void readTree(openvdb::GridBase& grid) {
+    int32_t buffers = 0;
+    stream_.read(reinterpret_cast<char*>(&buffers), sizeof(buffers));
+    if (buffers != 1) throw Error("file is truncated or damaged");
+    stream_.seekg(-static_cast<std::streamoff>(sizeof(buffers)), std::ios::cur);
+    grid.readTopology(stream_);
+    grid.readBuffers(stream_);
+  }
+
   const Entry& parentOf(const Entry& entry) const {
     for (const Entry& other : entries_)
       if (other.uniqueName == entry.parent && other.parent.empty()) return other;
