@@ -59,15 +59,24 @@ def fail(message):
     sys.exit(f"error: {message}")
 
 
+class CannotRun(Exception):
+    """A renderer other than ours that failed: the others are measured all the same."""
+
+
 def run_timed(command, **more):
-    """Runs a command to its end; CPU seconds (user + system) and wall-clock seconds of it and its children."""
+    """Runs a command to its end; CPU seconds (user + system) and wall-clock seconds of it, and what subprocess.run gives."""
     before, start = os.times(), time.monotonic()
     done = subprocess.run([str(word) for word in command], **more)
     wall, after = time.monotonic() - start, os.times()
-    if done.returncode != 0:
-        fail(f"exit code {done.returncode} of: {' '.join(str(word) for word in command)}")
     cpu = (after.children_user - before.children_user) + (after.children_system - before.children_system)
     return cpu, wall, done
+
+
+def run_ours(command):
+    cpu, wall, done = run_timed(command)
+    if done.returncode != 0:
+        fail(f"exit code {done.returncode} of: {' '.join(str(word) for word in command)}")
+    return cpu, wall
 
 
 def unpack_scenes(folder):
@@ -101,7 +110,7 @@ def reference_for(name, scene, defines, target, options):
     if not (image.exists() and stats.exists() and stats.stat().st_mtime > newest):
         print(f"{name}: rendering a reference to relMSE {target:g}", file=sys.stderr, flush=True)
         command = virga_command(scene, defines, options, image, REFERENCE_SEED, stats)
-        run_timed(command + ["--error", target])
+        run_ours(command + ["--error", target])
     return image, json.loads(stats.read_text())["estimated_relmse"]
 
 
@@ -118,21 +127,18 @@ def error_against(image, reference, reference_error):
 def run_virga(name, scene, defines, spp, options, seed):
     image, stats = OUT / f"virga-{name}.exr", OUT / f"virga-{name}.json"
     command = virga_command(scene, defines, options, image, seed, stats)
-    cpu, wall, _ = run_timed(command + ["--passes", spp, "--method", options.method])
+    cpu, wall = run_ours(command + ["--passes", spp, "--method", options.method])
     return image, cpu, wall
 
 
-# Runs in a process of its own, so that its CPU time can be told and threads be limited.
+# Runs in a process of its own, so that its CPU time can be told and its cores be limited.
 MITSUBA_PROGRAM = """
+import os
 import sys
 scene, output, variant, size, spp, seed, threads, defines = sys.argv[1:9]
+os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:int(threads)])
 import mitsuba as mi
 mi.set_variant(variant)
-if variant.startswith("scalar"):
-    mi.Thread.set_thread_count(int(threads)) if hasattr(mi.Thread, "set_thread_count") else None
-else:
-    import drjit as dr
-    dr.set_thread_count(int(threads))
 values = dict(pair.split("=", 1) for pair in defines.split(",") if pair)
 loaded = mi.load_file(scene, res=size, spp=spp, **values)
 picture = mi.render(loaded, spp=int(spp), seed=int(seed))
@@ -146,7 +152,11 @@ def run_mitsuba(variant):
         pairs = ",".join(f"{n}={v}" for n, v in defines.items())
         command = [sys.executable, "-c", MITSUBA_PROGRAM, scene, image, variant]
         command += [options.size, spp, seed, options.threads, pairs]
-        cpu, wall, _ = run_timed(command)
+        log = OUT / f"mitsuba-{variant}.log"
+        with open(log, "w") as output:
+            cpu, wall, done = run_timed(command, stdout=output, stderr=output)
+        if done.returncode != 0:
+            raise CannotRun(f"mitsuba {variant}: exit code {done.returncode}, see {log}")
         return image, cpu, wall
 
     return run
@@ -203,7 +213,13 @@ def main():
     OUT.mkdir(parents=True, exist_ok=True)
     scratch = unpack_scenes(options.scenes)
     cases = [case for case in CASES if not options.only or case[0] in options.only]
-    rows = [measure(name, run, case, scratch, options) for case in cases for name, run in renderers(options)]
+    rows = []
+    for case in cases:
+        for name, run in renderers(options):
+            try:
+                rows.append(measure(name, run, case, scratch, options))
+            except CannotRun as problem:
+                print(f"warning: {problem}", file=sys.stderr)
     print_table(rows)
     machine = {"processor": platform.processor() or platform.machine(), "threads": options.threads, "size": options.size}
     (OUT / "results.json").write_text(json.dumps({"machine": machine, "results": rows}, indent=2) + "\n")
