@@ -11,7 +11,6 @@ virga=build/release/virga
 mkdir -p out
 echo "making smoke, 128 voxels a side, and a scene around it"
 "$virga" make smoke --resolution 128 --seed 1 -o out/demo.vdb --scene out/demo.xml
-echo "rendering out/demo.xml, 512 x 512 pixels"
 "$virga" render out/demo.xml --size 512x512 --spp "${VIRGA_DEMO_SPP:-64}" -o out/demo.exr -o out/demo.png
 
 cat <<'TEXT'

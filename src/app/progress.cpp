@@ -73,9 +73,12 @@ void Progress::show(const RenderState& state) {
 }
 
 void Progress::finish(const RenderState& state) {
-  if (mode_ != Mode::bar) return;
-  draw(state);
-  fmt::print(stderr, "\n");
+  if (mode_ == Mode::silent) return;
+  const std::string text = progressText({}, state);
+  if (mode_ == Mode::bar)
+    fmt::print(stderr, "\r\033[K{} {}\n", barText(1, kBarWidth), text);
+  else
+    fmt::print(stderr, "{}\n", text);
 }
 
 }  // namespace virga::app

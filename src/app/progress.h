@@ -26,7 +26,7 @@ class Progress {
 
   Progress(Mode mode, const StopRules& rules) : mode_(mode), rules_(rules) {}
   void show(const RenderState&);
-  /// The last word on it: the bar stays, and what follows starts on a line of its own.
+  /// The last word on it, on a line that stays.
   void finish(const RenderState&);
 
  private:

@@ -16,6 +16,11 @@ void requireEstimate(const RenderSession& session, const StopRules& rules, const
       {.position = {}, .hint = "use --passes or --time", .notes = {}});
 }
 
+void estimate(const RenderSession& session, RenderState& state) {
+  state.relMse = session.film().estimatedRelMse();
+  state.relMsePasses = state.passes;
+}
+
 }  // namespace
 
 LoopOutcome renderLoop(RenderSession& session, const StopRules& rules, std::stop_token stop,
@@ -31,15 +36,13 @@ LoopOutcome renderLoop(RenderSession& session, const StopRules& rules, std::stop
     state.converged = pass.converged;
     state.interrupted = stop.stop_requested();
     out.biased |= pass.biased;
-    if (schedule.due(state.passes)) {
-      state.relMse = session.film().estimatedRelMse();
-      state.relMsePasses = state.passes;
-    }
+    if (schedule.due(state.passes)) estimate(session, state);
     state.seconds = watch.seconds();
     onState(state);
     requireEstimate(session, rules, state);
     if (const auto reason = stopReason(rules, state)) {
       out.reason = *reason;
+      estimate(session, state);
       return out;
     }
   }
