@@ -26,9 +26,8 @@ struct EquiangularSegment {
   /// t = t_y + D tan(theta), theta uniform between the ends; D the distance from y to the line.
   VIRGA_HD Sample sample(Vec3 y, float u) const {
     const Angles a(*this, y);
-    const float x = a.height * std::tan(lerp(a.theta0, a.theta1, u));
-    const float t = clamp(a.foot + x, t0, t1);
-    return {t, a.pdf(x)};
+    const float t = clamp(t0 + a.distance(u), t0, t1);
+    return {t, a.pdf(t - a.foot)};
   }
   VIRGA_HD float pdf(Vec3 y, float t) const {
     const Angles a(*this, y);
@@ -36,21 +35,29 @@ struct EquiangularSegment {
   }
 
  private:
+  /// The segment as seen from y. From afar its ends are at nearly the same angle: their difference is never formed.
   struct Angles {
-    float foot, height, theta0, theta1;
+    float foot, height;  ///< of y: along the ray, and beside it
+    float start;         ///< of the segment, from the foot
+    float range;         ///< angle that the segment fills [rad]
 
     VIRGA_HD Angles(const EquiangularSegment& s, Vec3 y) {
       const Vec3 toLight = y - s.ray.o;
       foot = dot(toLight, s.ray.d);
       // A light on the ray would leave no width to sample; the floor keeps the density finite and exact for what is drawn.
-      height = std::fmax(length(toLight - s.ray.d * foot), 1e-4f * std::fmax(std::fabs(foot), 1e-20f));
-      theta0 = std::atan((s.t0 - foot) / height);
-      theta1 = std::isinf(s.t1) ? kPi / 2 : std::atan((s.t1 - foot) / height);
+      height = std::fmax(length(toLight - s.ray.d * foot), 1e-4f * std::fmax(std::fabs(foot), 1e-12f));
+      start = s.t0 - foot;
+      // atan(b) - atan(a) = atan2(b - a, 1 + a b)
+      range = std::isinf(s.t1) ? std::atan2(height, start)
+                               : std::atan2(height * (s.t1 - s.t0), height * height + start * (s.t1 - foot));
     }
-    VIRGA_HD float pdf(float x) const {
-      const float range = theta1 - theta0;
-      return range > 0 ? height / (range * (height * height + x * x)) : 0;
+    /// From the segment's start to the point at the share u of the angle: tan(a + b) - tan(a), over one denominator.
+    VIRGA_HD float distance(float u) const {
+      const float s = std::sin(u * range), c = std::cos(u * range);
+      const float denominator = height * c - start * s;
+      return denominator > 0 ? s * (height * height + start * start) / denominator : kInfinity;
     }
+    VIRGA_HD float pdf(float x) const { return range > 0 ? height / (range * (height * height + x * x)) : 0; }
   };
 };
 
