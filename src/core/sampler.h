@@ -14,25 +14,34 @@ VIRGA_HD constexpr uint32_t reverseBits(uint32_t x) {
   return (x >> 16) | (x << 16);
 }
 
-/// Owen scrambling (nested uniform) of a binary fraction, by a hash in which every bit depends on higher bits only
-/// (Laine and Karras 2011; constants of N. Vegdahl).
-VIRGA_HD constexpr uint32_t owenScramble(uint32_t fraction, uint32_t seed) {
-  uint32_t x = reverseBits(fraction);
+/// A hash in which every bit depends on lower bits only (Laine and Karras 2011; constants of N. Vegdahl): Owen scrambling of a
+/// binary fraction whose bits stand in reverse.
+VIRGA_HD constexpr uint32_t scrambleReversed(uint32_t x, uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
   x *= (seed >> 16) | 1u;
   x ^= x * 0x05526c56u;
   x ^= x * 0x53a22864u;
-  return reverseBits(x);
+  return x;
 }
 
-/// Second dimension of Sobol's sequence (primitive polynomial x + 1): its generator matrix is Pascal's triangle modulo 2.
-VIRGA_HD constexpr uint32_t sobolSecond(uint32_t index) {
-  uint32_t result = 0;
-  for (uint32_t column = 0x80000000u; index != 0; index >>= 1, column ^= column >> 1)
-    if (index & 1u) result ^= column;
-  return result;
+/// Owen scrambling (nested uniform) of a binary fraction.
+VIRGA_HD constexpr uint32_t owenScramble(uint32_t fraction, uint32_t seed) {
+  return reverseBits(scrambleReversed(reverseBits(fraction), seed));
 }
+
+/// Second dimension of Sobol's sequence (primitive polynomial x + 1), its bits in reverse. The generator matrix is Pascal's
+/// triangle modulo 2, and a binomial coefficient (i over j) is odd where the bits of j are a subset of those of i (Lucas): so the
+/// product is a sum over supersets, bit by bit of the bits' numbers.
+VIRGA_HD constexpr uint32_t sobolSecondReversed(uint32_t index) {
+  index ^= (index >> 1) & 0x55555555u;
+  index ^= (index >> 2) & 0x33333333u;
+  index ^= (index >> 4) & 0x0f0f0f0fu;
+  index ^= (index >> 8) & 0x00ff00ffu;
+  index ^= (index >> 16) & 0x0000ffffu;
+  return index;
+}
+VIRGA_HD constexpr uint32_t sobolSecond(uint32_t index) { return reverseBits(sobolSecondReversed(index)); }
 
 /// Names one sample: everything random in it is a function of these numbers and of the order in which it is asked for.
 struct SampleId {
@@ -48,20 +57,19 @@ struct SampleId {
 class Sampler {
  public:
   VIRGA_HD explicit Sampler(const SampleId& id)
-      : index_(id.index),
-        scramble_(hashCombine(static_cast<uint32_t>(hash64(id.seed * kReplicateStride + id.replicate)), id.stream)),
-        rng_((static_cast<uint64_t>(scramble_) << 32) ^ hash64(id.seed ^ (static_cast<uint64_t>(id.stream) << 32)) ^ id.index) {}
+      : reversedIndex_(reverseBits(id.index)),
+        stream_(hash64(hash64(id.seed * kReplicateStride + id.replicate) + id.stream)),
+        rng_(stream_ ^ id.index) {}
 
   VIRGA_HD Vec2 next2D() {
-    const uint32_t pair = hashCombine(scramble_, ++pair_);
-    const uint32_t shuffled = shuffledIndex(pair);
-    const uint32_t x = owenScramble(reverseBits(shuffled), hash32(pair ^ 0x02e5be93u));
-    const uint32_t y = owenScramble(sobolSecond(shuffled), hash32(pair ^ 0x967a889bu));
-    return {toUnitFloat(x), toUnitFloat(y)};
+    const Pair p = nextPair();
+    const uint32_t x = scrambleReversed(p.index, p.seedX);
+    const uint32_t y = scrambleReversed(sobolSecondReversed(p.index), p.seedY);
+    return {toUnitFloat(reverseBits(x)), toUnitFloat(reverseBits(y))};
   }
   VIRGA_HD float next1D() {
-    const uint32_t pair = hashCombine(scramble_, ++pair_);
-    return toUnitFloat(owenScramble(reverseBits(shuffledIndex(pair)), hash32(pair ^ 0x02e5be93u)));
+    const Pair p = nextPair();
+    return toUnitFloat(reverseBits(scrambleReversed(p.index, p.seedX)));
   }
   VIRGA_HD float random() { return rng_.next(); }
   VIRGA_HD Vec2 random2D() {
@@ -71,12 +79,22 @@ class Sampler {
   VIRGA_HD Pcg32& stream() { return rng_; }
 
  private:
-  // A bit of the result depends on higher bits of the index only, so an aligned block of indices becomes another aligned
-  // block and stays a (0,2)-net. (Were it the lower bits, the second coordinate would lose its strata.)
-  VIRGA_HD uint32_t shuffledIndex(uint32_t pair) const { return owenScramble(index_, hash32(pair ^ 0x68bc21ebu)); }
+  /// One pair of dimensions: where in the sequence this sample stands, and its scrambles.
+  struct Pair {
+    uint32_t index, seedX, seedY;
+  };
+  // In the shuffled index a bit depends on higher bits only, so that an aligned block of indices becomes another aligned block
+  // and stays a (0,2)-net. (Were it the lower bits, the second coordinate would lose its strata.)
+  VIRGA_HD Pair nextPair() {
+    const uint64_t h = hash64(stream_ + ++pair_ * kReplicateStride);
+    const auto low = static_cast<uint32_t>(h), high = static_cast<uint32_t>(h >> 32);
+    return {reverseBits(scrambleReversed(reversedIndex_, low)), high, hash32(low ^ high)};
+  }
 
   static constexpr uint64_t kReplicateStride = 0x9e3779b97f4a7c15ull;
-  uint32_t index_, scramble_, pair_ = 0;
+  uint32_t reversedIndex_;
+  uint32_t pair_ = 0;
+  uint64_t stream_;
   Pcg32 rng_;
 };
 

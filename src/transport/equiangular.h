@@ -8,13 +8,22 @@ namespace virga {
 /// Part of a ray in one homogeneous medium, where scattering points can be drawn in proportion to the inverse squared distance to
 /// a light (Kulla and Fajardo 2012) instead of by free flight. Before it the ray meets no medium.
 struct EquiangularSegment {
-  int medium = -1;         ///< -1: there is none
+  /// Lights of less area than this, in squared mean free paths, are small: near them, connections from free flights have a
+  /// variance that is infinite (points) or nearly so. For larger ones hits by chance bound it.
+  static constexpr float kSmallLight = 0.01f;
+
+  int medium = -1;           ///< -1: there is none
+  bool largeLights = false;  ///< to be aimed at, too
   Ray ray;
   float t0 = 0, t1 = 0;    ///< t1 may be infinite
   float sigmaT = 0;        ///< [1/unit]
 
   VIRGA_HD bool active() const { return medium >= 0; }
   VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
+
+  VIRGA_HD bool aimsAt(const EmitterView& e) const {
+    return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight);
+  }
 
   /// Density of a free flight that ends at t [1/unit].
   VIRGA_HD float freeFlightPdf(float t) const { return sigmaT * transmittanceTo(t); }

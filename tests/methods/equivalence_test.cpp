@@ -198,9 +198,9 @@ TEST(Equivalence, EquiangularSamplingChangesNothing) {
                           <emitter type="area"><rgb name="radiance" value="20"/></emitter></shape>)";
   const SceneSnapshot scene = sceneOf(fog);
   const auto with = [&](const char* equiangular, uint64_t seed) {
-    return rendered(scene, {.passes = 1024, .seed = seed, .settings = {{"equiangular", equiangular}}}).film().beauty();
+    return rendered(scene, {.passes = 1536, .seed = seed, .settings = {{"equiangular_depth", equiangular}}}).film().beauty();
   };
-  const Agreement result = agreement(with("true", 1), with("false", 2));
+  const Agreement result = agreement(with("8", 1), with("0", 2));
   EXPECT_LT(result.worstZ, 3.5);
   EXPECT_LT(result.precision, 0.006);
 }

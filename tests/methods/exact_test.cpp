@@ -114,13 +114,13 @@ std::string airlightScene(const Airlight& a) {
 
 TEST(Airlight, SingleScatteringAgreesWithQuadrature) {
   for (const Airlight& a : kAirlights)
-    for (const char* equiangular : {"true", "false"}) {
+    for (const char* equiangular : {"1", "0"}) {
       const SceneSnapshot scene = sceneOf(airlightScene(a));
       expectAgreement(a.radiance, [&](int passes, uint64_t seed) {
         const RenderSession session = rendered(
-            scene, {.passes = passes, .seed = seed, .layers = LayerMask::all(), .settings = {{"equiangular", equiangular}}});
+            scene, {.passes = passes, .seed = seed, .layers = LayerMask::all(), .settings = {{"equiangular_depth", equiangular}}});
         return pixelMoments(session.film().layer(Layer::directMedia));
-      }, fmt::format("sigma_s {} equiangular {}", a.sigmaS, equiangular));
+      }, fmt::format("sigma_s {} equiangular depth {}", a.sigmaS, equiangular));
     }
 }
 

@@ -15,7 +15,7 @@ class PathMethod final : public Method {
     SettingsReader reader(settings, kPathSettings, "path");
     maxDepth_ = reader.integer("max_depth", -1);
     rrDepth_ = reader.integer("rr_depth", 1);
-    equiangular_ = reader.boolean("equiangular");
+    equiangularDepth_ = reader.integer("equiangular_depth", 0);
     seed_ = settings.seed;
   }
 
@@ -45,7 +45,7 @@ class PathMethod final : public Method {
   PathOptions optionsForScene() const {
     return {.maxDepth = maxDepth_.value_or(scene_->integrator.maxDepth),
             .rrDepth = rrDepth_.value_or(scene_->integrator.rrDepth),
-            .equiangular = equiangular_.value_or(true)};
+            .equiangularDepth = equiangularDepth_.value_or(PathOptions{}.equiangularDepth)};
   }
   // Pixels by their place on the whole film, so that a crop window shows the very same samples.
   uint32_t pixelStream(int x, int y) const {
@@ -60,8 +60,7 @@ class PathMethod final : public Method {
   }
 
   SceneSnapshot scene_;
-  std::optional<int> maxDepth_, rrDepth_;
-  std::optional<bool> equiangular_;
+  std::optional<int> maxDepth_, rrDepth_, equiangularDepth_;
   uint64_t seed_ = 0;
 };
 

@@ -12,7 +12,7 @@ namespace virga {
 struct PathOptions {
   int maxDepth = -1;  ///< segments; -1: no limit
   int rrDepth = 5;    ///< scattering events before Russian roulette
-  bool equiangular = true;
+  int equiangularDepth = 1;  ///< segments on which technique B aims at large lights, too; at small ones it always does
 };
 
 /// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
@@ -26,7 +26,7 @@ template <class Rays>
 class PathTracer {
  public:
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
-      : scene_(scene), rays_(rays), options_(options) {}
+      : scene_(scene), rays_(rays), options_(options), hasSmallLights_(hasSmallLights(scene)) {}
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)]. `behind`: from the near plane back to the eye [unit].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, float behind, Sampler& sampler) const {
@@ -99,11 +99,11 @@ class PathTracer {
     MediaState segmentMedia;
     EquiangularSegment segment;
     Collision collision;
-    bool first = options_.equiangular;
+    bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
       if (walk.media.vacuum()) return true;
       if (std::exchange(first, false)) {
-        segment = equiangularSegment(walk, t0, t1);
+        segment = equiangularSegment(walk, t0, t1, path.depth < options_.equiangularDepth);
         if (segment.active()) segmentMedia = walk.media;
       }
       collision = sampleCollision(scene_, walk, t0, t1, sampler.stream());
@@ -116,12 +116,18 @@ class PathTracer {
     return false;
   }
 
-  VIRGA_HD EquiangularSegment equiangularSegment(const MediaRay& r, float t0, float t1) const {
-    if (r.media.count() != 1) return {};
+  VIRGA_HD EquiangularSegment equiangularSegment(const MediaRay& r, float t0, float t1, bool largeLights) const {
+    if (r.media.count() != 1 || !(largeLights || hasSmallLights_)) return {};
     const int index = r.media.medium(0);
     const MediumView& medium = scene_.media[index];
     if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
-    return {index, r.ray, t0, t1, medium.sigmaT};
+    return {index, largeLights, r.ray, t0, t1, medium.sigmaT};
+  }
+  VIRGA_HD static bool hasSmallLights(const SceneView& scene) {
+    for (const EmitterView& e : scene.emitters)
+      for (const MediumView& m : scene.media)
+        if (m.homogeneous && e.isLocal() && e.area * square(m.sigmaT) < EquiangularSegment::kSmallLight) return true;
+    return false;
   }
 
   // --- light that the path meets ---
@@ -143,7 +149,7 @@ class PathTracer {
     if (last.connected) {
       const float choice = scene_.emitterChoice.probability(shape.emitter);
       const float connection = choice * areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
-      if (last.segment.active()) {
+      if (last.segment.aimsAt(emitter)) {
         const float flight = last.segment.freeFlightPdf(last.t);
         const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
         const float equiangular = choice * uniform * last.segment.pdf(point.p, last.t);
@@ -187,7 +193,7 @@ class PathTracer {
     const EmitterView& emitter = scene_.emitters[choice.index];
     const Vec2 u = pair(path, sampler);
     const float uDistance = one(path, sampler);
-    if (!emitter.isLocal()) return;
+    if (!segment.aimsAt(emitter)) return;
     const LightPoint on = sampleLightPoint(scene_, emitter, u);
     const EquiangularSegment::Sample distance = segment.sample(on.p, uDistance);
     if (!(distance.pdf > 0)) return;
@@ -223,7 +229,7 @@ class PathTracer {
     float w = weight(own, phasePdf);
     const EquiangularSegment& segment = path.last.segment;
     const EmitterView& emitter = scene_.emitters[c.emitter];
-    if (segment.active() && emitter.isLocal()) {
+    if (segment.aimsAt(emitter)) {
       const Vec3 y = x + c.light.wi * c.light.distance;
       const float flight = segment.freeFlightPdf(path.last.t);
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
@@ -327,6 +333,7 @@ class PathTracer {
   const SceneView& scene_;
   const Rays& rays_;
   const PathOptions& options_;
+  bool hasSmallLights_;
 };
 
 }  // namespace virga
