@@ -188,6 +188,24 @@ MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
   return medium;
 }
 
+bool sameGrid(const GridView& a, const GridView& b) {
+  return a.kind == b.kind && a.dense.values == b.dense.values && a.sparse.grid == b.sparse.grid && a.background == b.background;
+}
+
+bool sameMedium(const MediumView& a, const MediumView& b) {
+  return a.sigmaT == b.sigmaT && a.homogeneous == b.homogeneous && sameGrid(a.density, b.density) &&
+         a.worldToDensity == b.worldToDensity && a.albedo == b.albedo && a.albedoGrid.values == b.albedoGrid.values &&
+         a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase;
+}
+
+// Media of equal content are one, as if they had been referred to: a boundary whose exterior repeats what surrounds it means
+// that very medium.
+int indexOf(std::vector<MediumView>& media, const MediumView& medium) {
+  const auto known = std::find_if(media.begin(), media.end(), [&](const MediumView& m) { return sameMedium(m, medium); });
+  if (known == media.end()) return media.push_back(medium), static_cast<int>(media.size()) - 1;
+  return static_cast<int>(known - media.begin());
+}
+
 }  // namespace
 
 int buildMedium(BuildContext& context, const Node& node) {
@@ -198,10 +216,7 @@ int buildMedium(BuildContext& context, const Node& node) {
   PluginReader reader(node, context.diagnostics);
   const MediumView medium = build(context, reader);
   reader.finish();
-  const int index = static_cast<int>(context.parts.media.size());
-  context.parts.media.push_back(medium);
-  context.mediumIndex[&node] = index;
-  return index;
+  return context.mediumIndex[&node] = indexOf(context.parts.media, medium);
 }
 
 }  // namespace virga
