@@ -107,7 +107,6 @@ namespace {
 /// Extends Embree's context: where `list` is set, every hit goes there and none ends the ray.
 struct Context {
   RTCIntersectContext embree;
-  float shift = 0;  ///< the traced ray starts at ray.o + shift * ray.d
   CrossingList* list = nullptr;
 };
 
@@ -154,7 +153,7 @@ void intersectCallback(const RTCIntersectFunctionNArguments* args) {
   if (context->list) {
     for (int i = 0; i < hits.count; ++i)
       if (hits.hit[i].t >= r.tnear && hits.hit[i].t <= r.tfar)
-        context->list->insert({hits.hit[i].t + context->shift, args->geomID, hits.hit[i].entering});
+        context->list->insert({hits.hit[i].t, args->geomID, hits.hit[i].entering});
     return;
   }
   const LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
@@ -172,13 +171,20 @@ void occludedCallback(const RTCOccludedFunctionNArguments* args) {
     r->tfar = -kInfinity;
 }
 
+// Are the barycentric weights of a hit so small that the ray may have missed (or met) the triangle by rounding alone?
+bool onEdge(const RTCRay& r, const RTCHit& h) {
+  const float reach = std::max({std::fabs(r.org_x), std::fabs(r.org_y), std::fabs(r.org_z)}) + r.tfar;
+  const float size = std::sqrt(length(Vec3(h.Ng_x, h.Ng_y, h.Ng_z)));
+  return std::min({h.u, h.v, 1 - h.u - h.v}) * size < 1e-6f * reach;
+}
+
 // Records a triangle's hit as a crossing and rejects it, so that the traversal goes on to the ray's end.
 void recordCrossing(const RTCFilterFunctionNArguments* args) {
   auto* context = reinterpret_cast<Context*>(args->context);
   const auto* r = reinterpret_cast<const RTCRay*>(args->ray);
   const auto* h = reinterpret_cast<const RTCHit*>(args->hit);
   const bool entering = h->Ng_x * r->dir_x + h->Ng_y * r->dir_y + h->Ng_z * r->dir_z < 0;
-  context->list->insert({r->tfar + context->shift, h->geomID, entering});
+  context->list->insert({r->tfar, h->geomID, entering, onEdge(*r, *h)});
   args->valid[0] = 0;
 }
 
@@ -283,15 +289,12 @@ void RayScene::crossings(const Ray& ray, float tMin, float tMax, CrossingList& l
       gatherAnalytic(shapes_[i]->impl(), static_cast<uint32_t>(i), ray, tMin, tMax, list);
     return;
   }
-  // Embree wants t >= 0: start at tMin.
   Context context;
   rtcInitIntersectContext(&context.embree);
   context.embree.filter = recordCrossing;
-  context.shift = tMin;
   context.list = &list;
-  const Vec3 o = ray.at(tMin);
   RTCRayHit q{};
-  q.ray = {o.x, o.y, o.z, 0, ray.d.x, ray.d.y, ray.d.z, 0, tMax - tMin, ~0u, 0, 0};
+  q.ray = {ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(impl_->scene, &context.embree, &q);

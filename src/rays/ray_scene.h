@@ -9,47 +9,9 @@
 
 #include "core/transform.h"
 #include "core/vec.h"
+#include "rays/ray_hit.h"
 
 namespace virga {
-
-/// What a ray met: the shape's index in its RayScene, the primitive (triangle) and where on it.
-struct RayHit {
-  static constexpr uint32_t kNone = ~0u;
-  float t = kInfinity;
-  uint32_t shape = kNone;
-  uint32_t primitive = 0;
-  float u = 0, v = 0;  ///< barycentric weights of the triangle's second and third vertex
-
-  VIRGA_HD bool found() const { return shape != kNone; }
-};
-
-/// A ray passes a boundary.
-struct Crossing {
-  float t;
-  uint32_t shape;
-  bool entering;
-};
-
-/// The nearest crossings of a ray, sorted by t; entries beyond the capacity are dropped from the far end, and `complete` tells.
-struct CrossingList {
-  static constexpr int kCapacity = 32;
-  std::array<Crossing, kCapacity> items;
-  int count = 0;
-  bool complete = true;
-
-  void insert(const Crossing& c) {
-    if (count == kCapacity) {
-      complete = false;
-      if (c.t >= items[kCapacity - 1].t) return;
-      --count;
-    }
-    int i = count++;
-    for (; i > 0 && items[static_cast<size_t>(i - 1)].t > c.t; --i)
-      items[static_cast<size_t>(i)] = items[static_cast<size_t>(i - 1)];
-    items[static_cast<size_t>(i)] = c;
-  }
-  std::span<const Crossing> crossings() const { return {items.data(), static_cast<size_t>(count)}; }
-};
 
 /// One shape, ready to be traced, in world coordinates. Immutable, shared between scenes.
 class RayShape {
@@ -82,13 +44,25 @@ class RayScene {
   RayHit nearest(const Ray& ray, float tMin, float tMax) const;
   /// Anything with tMin < t < tMax?
   bool occluded(const Ray& ray, float tMin, float tMax) const;
-  /// All crossings with tMin <= t <= tMax, t possibly negative.
+  /// All crossings with 0 <= tMin <= t <= tMax (those of triangles: tMin < t). The same ray finds them at the same t in every call.
   void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const;
 
  private:
   struct Impl;
   std::vector<std::shared_ptr<const RayShape>> shapes_;
   std::unique_ptr<Impl> impl_;
+};
+
+/// The ray queries that kernels need, over Embree. A device has its own type with the same functions.
+struct EmbreeRays {
+  const RayScene& surfaces;
+  const RayScene& boundaries;
+
+  RayHit nearest(const Ray& ray, float tMax) const { return surfaces.nearest(ray, 0, tMax); }
+  bool occluded(const Ray& ray, float tMax) const { return surfaces.occluded(ray, 0, tMax); }
+  void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const {
+    boundaries.crossings(ray, tMin, tMax, list);
+  }
 };
 
 }  // namespace virga

@@ -116,7 +116,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   chooseEmittersByPower(context);
   linkViews(*scene, *parts);
   const int declared = scene->view.cameraMedia.base();
-  scene->view.cameraMedia = mediaAt(scene->view, *scene->boundaryRays, scene->camera.toWorld.translation);
+  scene->view.cameraMedia = mediaAt(*scene, scene->camera.toWorld.translation);
   if (declared != MediaState::kNone) scene->view.cameraMedia.setBase(declared);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);

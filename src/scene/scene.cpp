@@ -85,26 +85,51 @@ ChangeSet differences(const SceneDescription& before, const SceneDescription& af
   return set;
 }
 
-MediaState mediaAt(const SceneView& scene, const RayScene& boundaries, Vec3 p) {
-  MediaState state;
-  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside.
-  const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
-  std::set<uint32_t> seen;
-  bool baseKnown = false;
-  float from = 0;
-  for (CrossingList list;; from = std::nextafter(list.items[CrossingList::kCapacity - 1].t, kInfinity), list = {}) {
-    boundaries.crossings(ray, from, kInfinity, list);
-    for (const Crossing& c : list.crossings()) {
-      if (!seen.insert(c.shape).second) continue;
-      const MediumTransition& media = scene.boundaries[c.shape];
-      if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
-      if (media.replaces && !baseKnown) {
-        baseKnown = true;
-        state.replace(c.entering ? media.exterior : media.interior);
-      }
-    }
-    if (list.complete) return state;
+namespace {
+
+/// The side of the nearest surface along a ray that has a say about media: where it is and what it says.
+struct Surroundings {
+  float t = kInfinity;
+  int medium = MediumTransition::kNone;
+};
+
+Surroundings surfaceSurroundings(const SceneView& view, const RayScene& surfaces, const Ray& ray) {
+  for (float from = 0;;) {
+    const RayHit hit = surfaces.nearest(ray, from, kInfinity);
+    if (!hit.found()) return {};
+    const ShapeView& shape = view.surfaces[hit.shape];
+    const bool outside = dot(surfacePoint(shape, ray, hit, view.scale).geometricNormal, ray.d) < 0;
+    if (shape.media.replaces) return {hit.t, outside ? shape.media.exterior : shape.media.interior};
+    from = std::nextafter(hit.t, kInfinity);
   }
+}
+
+}  // namespace
+
+MediaState mediaAt(const Scene& scene, Vec3 p) {
+  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside; and the first
+  // boundary or surface that declares media on both sides tells which one it starts in.
+  const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
+  Surroundings base = surfaceSurroundings(scene.view, *scene.surfaceRays, ray);
+  MediaState state;
+  std::set<uint32_t> seen;
+  CrossingList list;
+  for (float from = 0;; list.clear()) {
+    scene.boundaryRays->crossings(ray, from, kInfinity, list);
+    for (int i = 0; i < list.count; ++i) {
+      const Crossing& c = list.items[i];
+      if (!seen.insert(c.shape).second) continue;
+      const MediumTransition& media = scene.view.boundaries[c.shape];
+      if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
+      if (media.replaces && c.t < base.t) base = {c.t, c.entering ? media.exterior : media.interior};
+    }
+    if (list.complete) break;
+    // Once more from the last one: others may lie at the same distance.
+    const float last = list.items[list.count - 1].t, before = std::nextafter(last, -kInfinity);
+    from = before > from ? before : std::nextafter(last, kInfinity);
+  }
+  if (base.medium != MediumTransition::kNone) state.replace(base.medium);
+  return state;
 }
 
 uint64_t contentHash(const SceneDescription& description) {

@@ -69,8 +69,9 @@ struct ChangeSet {
 /// By the ids of the objects in both descriptions.
 ChangeSet differences(const SceneDescription& before, const SceneDescription& after);
 
-/// Two rays through each side of a point tell which closed null boundaries it lies in.
-MediaState mediaAt(const SceneView& scene, const RayScene& boundaries, Vec3 p);
+/// The media around a point, away from all surfaces and boundaries: closed null boundaries that it lies in, and what the nearest
+/// surface or boundary that replaces says about its side.
+MediaState mediaAt(const Scene&, Vec3 p);
 
 /// 64 bits of everything that the description says, for metadata.
 uint64_t contentHash(const SceneDescription&);

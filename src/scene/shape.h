@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "core/vec.h"
-#include "rays/ray_scene.h"
+#include "rays/ray_hit.h"
 #include "scene/medium.h"
 
 namespace virga {

@@ -1,31 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "rays/ray_scene.h"
+#include "rays/ray_hit.h"
 #include "scene/scene_view.h"
 #include "transport/tracking.h"
 
 namespace virga {
 
-/// The ray queries that kernels need, over Embree. A device has its own type with the same functions.
-struct EmbreeRays {
-  const RayScene& surfaces;
-  const RayScene& boundaries;
-
-  RayHit nearest(const Ray& ray, float tMax) const { return surfaces.nearest(ray, 0, tMax); }
-  bool occluded(const Ray& ray, float tMax) const { return surfaces.occluded(ray, 0, tMax); }
-  void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const {
-    boundaries.crossings(ray, tMin, tMax, list);
-  }
-};
-
-/// A ray that knows the media at its start. `behind` >= 0: crossings up to that far behind the origin still apply, because the
-/// origin was moved off a surface that may coincide with a boundary.
+/// A ray that knows the media at a point on the way to its start.
 struct MediaRay {
   Ray ray;
-  MediaState media;
-  float behind = 0;
+  MediaState media;    ///< at the point `behind` before the origin
+  float behind = 0;    ///< [unit]
+  Vec3 approach = {};  ///< unit direction from that point to the origin; without length: the ray's own
 };
+
+/// The ray that leaves a surface toward w. A boundary may coincide with the surface (a cloud that stands on the ground), and
+/// `media` may have been found on either side of it: crossings are looked for across the surface, from side to side.
+VIRGA_HD inline MediaRay leaveSurface(const SurfacePoint& point, Vec3 w, const MediaState& media) {
+  const Vec3 across = dot(w, point.geometricNormal) >= 0 ? point.geometricNormal : -point.geometricNormal;
+  return {{point.originToward(w), w}, media, 4 * point.epsilon, across};
+}
 
 VIRGA_HD inline void applyCrossing(const SceneView& scene, const Crossing& crossing, MediaState& media) {
   const MediumTransition& transition = scene.boundaries[crossing.shape];
@@ -38,26 +33,82 @@ VIRGA_HD inline void applyCrossing(const SceneView& scene, const Crossing& cross
   }
 }
 
-/// Intervals of constant media along [0, tMax]: visit(t0, t1) while `media` holds the interval's media, until it returns false.
-/// Afterwards `media` is what holds where the walk ended. Boundaries are gathered as sorted crossings, never stepped over.
+/// Crossings that are no farther apart than the error of their distances are at one place.
+inline constexpr float kPlaceError = 2e-6f;
+/// How far behind a place the media are looked up where the crossings do not tell; likewise relative.
+inline constexpr float kBehindPlace = 1e-4f;
+
+/// Next crossing of one closed boundary along a ray that has nothing to do with the scene: leaving, if p lies inside.
+template <class Rays>
+VIRGA_HD bool insideBoundary(const Rays& rays, uint32_t shape, Vec3 p) {
+  const Ray ray{p, {0.6214712f, 0.4827161f, 0.6170366f}};
+  CrossingList list;
+  for (float from = 0;; list.clear()) {
+    rays.crossings(ray, from, kInfinity, list);
+    for (int i = 0; i < list.count; ++i)
+      if (list.items[i].shape == shape) return !list.items[i].entering;
+    if (list.complete) return false;
+    from = std::nextafter(list.items[list.count - 1].t, kInfinity);
+  }
+}
+
+/// Applies the crossings of one place. Where a boundary is entered and left at once, or may have been, the ray touches or passes
+/// an edge or a corner: a point behind it decides.
+template <class Rays>
+VIRGA_HD void applyPlace(const SceneView& scene, const Rays& rays, const Crossing* crossings, int count, Vec3 behind,
+                         MediaState& media) {
+  for (int i = 0; i < count; ++i) {
+    Crossing c = crossings[i];
+    bool doubtful = c.doubtful;
+    for (int j = 0; j < count; ++j) doubtful |= crossings[j].shape == c.shape && crossings[j].entering != c.entering;
+    if (doubtful) c.entering = insideBoundary(rays, c.shape, behind);
+    applyCrossing(scene, c, media);
+  }
+}
+
+/// Places along [0, tMax] where the ray crosses boundaries, in order: visit(t) before the media change there, until it returns
+/// false. Returns false if it did.
+template <class Rays, class Visit>
+VIRGA_HD bool walkPlaces(const SceneView& scene, const Rays& rays, const Ray& ray, float tMax, MediaState& media, Visit&& visit) {
+  const float scale = maxComponent(abs(ray.o));
+  CrossingList list;
+  for (float from = 0;; list.clear()) {
+    rays.crossings(ray, from, tMax, list);
+    for (int first = 0, last = 0; first < list.count; first = last) {
+      const float t = list.items[first].t, end = t + kPlaceError * (scale + t);
+      while (last < list.count && list.items[last].t <= end) ++last;
+      if (!list.complete && last == list.count && first > 0) {
+        from = std::nextafter(t, -kInfinity);  // the list may have been cut within this place: ask for all of it
+        break;
+      }
+      if (!visit(t)) return false;
+      const float here = list.items[last - 1].t, next = last < list.count ? list.items[last].t : kInfinity;
+      const Vec3 behind = ray.at(std::fmin(here + kBehindPlace * (scale + here), 0.5f * (here + next)));
+      applyPlace(scene, rays, list.items + first, last - first, behind, media);
+      from = std::nextafter(here, kInfinity);
+    }
+    if (list.complete) return true;
+  }
+}
+
+/// Intervals of constant media along [0, tMax]: visit(t0, t1) while `r.media` holds the interval's media, until it returns false.
+/// Afterwards `r.media` is what holds where the walk ended. Boundaries are gathered as sorted crossings, never stepped over.
 template <class Rays, class Visit>
 VIRGA_HD void walkMedia(const SceneView& scene, const Rays& rays, MediaRay& r, float tMax, Visit&& visit) {
   float t = 0;
   if (scene.boundaries.size > 0) {
-    float from = -r.behind;
-    for (CrossingList list;; list.count = 0, list.complete = true) {
-      rays.crossings(r.ray, from, tMax, list);
-      for (int i = 0; i < list.count; ++i) {
-        const Crossing& c = list.items[static_cast<size_t>(i)];
-        if (c.t > t) {
-          if (!visit(t, c.t)) return;
-          t = c.t;
-        }
-        applyCrossing(scene, c, r.media);
-      }
-      if (list.complete) break;
-      from = std::nextafter(list.items[CrossingList::kCapacity - 1].t, kInfinity);
+    if (r.behind > 0) {
+      const Vec3 d = lengthSquared(r.approach) > 0 ? r.approach : r.ray.d;
+      walkPlaces(scene, rays, {r.ray.o - d * r.behind, d}, r.behind, r.media, [](float) { return true; });
+      r.behind = 0;
     }
+    const bool finished = walkPlaces(scene, rays, r.ray, tMax, r.media, [&](float next) {
+      if (next <= t) return true;
+      const float start = t;
+      t = next;
+      return visit(start, next);
+    });
+    if (!finished) return;
   }
   if (t < tMax) visit(t, tMax);
 }

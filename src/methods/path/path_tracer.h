@@ -249,7 +249,7 @@ class PathTracer {
     if (isBlack(value)) return;
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
-    const float seen = visibility(leave(point, c.light.wi, media), c.light.distance, sampler);
+    const float seen = visibility(leaveSurface(point, c.light.wi, media), c.light.distance, sampler);
     if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
   }
 
@@ -284,12 +284,6 @@ class PathTracer {
     return {back ? &surface.back : &surface.front, frame, frame.toLocal(wo), back ? -point.geometricNormal : point.geometricNormal};
   }
 
-  /// The ray that leaves a surface toward w. What lies on the surface's own plane is looked for behind the origin, too.
-  VIRGA_HD static MediaRay leave(const SurfacePoint& point, Vec3 w, const MediaState& media) {
-    const float along = std::fmax(std::fabs(dot(w, point.geometricNormal)), 1e-3f);
-    return {{point.originToward(w), w}, media, 4 * point.epsilon / along};
-  }
-
   VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {
     const ShapeView& shape = scene_.surfaces[hit.shape];
     const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
@@ -313,7 +307,7 @@ class PathTracer {
     path.throughput *= s.weight;
     path.etaScale *= s.eta * s.eta;
     path.last = {point.p, s.pdf, !specular, 0, {}};
-    path.at = leave(point, wi, media);
+    path.at = leaveSurface(point, wi, media);
     const bool passes = dot(wi, point.geometricNormal) * dot(wo, point.geometricNormal) < 0;
     if (passes && shape.media.replaces)
       path.at.media.replace(dot(wi, point.geometricNormal) < 0 ? shape.media.interior : shape.media.exterior);
