@@ -41,7 +41,7 @@ struct Scene {
 
   explicit Scene(const Case& c) {
     const Vec3 d = normalize(Vec3(0.36f, 0.48f, 0.8f));
-    segment = {0, {{1, 2, -3}, d}, c.t0, c.t1, 0.5f};
+    segment = {.medium = 0, .ray = {{1, 2, -3}, d}, .t0 = c.t0, .t1 = c.t1, .sigmaT = 0.5f};
     light = segment.ray.at(c.foot) + Frame(d).s * c.height;
   }
 };
@@ -80,7 +80,8 @@ TEST(EquiangularSegment, AWrongLightIsNoticed) {
   for (const Case& c : kCases) {
     if (c.flat) continue;
     Scene scene(c);
-    scene.light += scene.segment.ray.d * (c.height > 0.5f ? 0.4f * c.height + 0.5f : 0.2f * std::max(c.height, 0.5f * std::fabs(c.foot - c.t0)));
+    const float shift = c.height > 0.5f ? 0.4f * c.height + 0.5f : 0.2f * std::max(c.height, 0.5f * std::fabs(c.foot - c.t0));
+    scene.light += scene.segment.ray.d * shift;
     EXPECT_LT(samplingP(c, scene.segment, scene.light), 1e-4) << c.name;
   }
 }
@@ -143,7 +144,7 @@ TEST(EquiangularSegment, EstimatesTheIntegralOfTheInverseSquare) {
 }
 
 TEST(EquiangularSegment, FreeFlightIsExponential) {
-  const EquiangularSegment s{0, {{}, {0, 0, 1}}, 2, kInfinity, 0.5f};
+  const EquiangularSegment s{.medium = 0, .ray = {{}, {0, 0, 1}}, .t0 = 2, .t1 = kInfinity, .sigmaT = 0.5f};
   EXPECT_FLOAT_EQ(s.transmittanceTo(4), std::exp(-1.f));
   EXPECT_FLOAT_EQ(s.freeFlightPdf(4), 0.5f * std::exp(-1.f));
   EXPECT_TRUE(s.contains(2) && s.contains(1e30f));
