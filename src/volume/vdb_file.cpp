@@ -19,12 +19,13 @@
 
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
+#include "volume/vdb_walk.h"
 
 namespace virga {
 namespace {
 
 constexpr int64_t kMagic = 0x56444220;
-constexpr uint32_t kOldestVersion = 220;
+constexpr uint32_t kOldestVersion = 222;
 
 void initialiseOnce() {
   static std::once_flag once;
@@ -33,6 +34,8 @@ void initialiseOnce() {
     openvdb::initialize();
   });
 }
+
+[[noreturn]] void damaged() { throw Error("file is truncated or damaged"); }
 
 class MemoryBuffer : public std::streambuf {
  public:
@@ -54,7 +57,7 @@ class MemoryBuffer : public std::streambuf {
 };
 
 // Bytes as a stream that throws where they end. OpenVDB itself does not look whether a read succeeded: on a plain
-// stream it would go on with what its variables held.
+// stream it would go on with what its variables held. (What it had allocated for a tree's topology is lost then.)
 class MemoryStream : private MemoryBuffer, public std::istream {
  public:
   MemoryStream(const std::byte* bytes, size_t size)
@@ -99,7 +102,6 @@ class ContentsReader {
                               static_cast<int>(openvdb::OPENVDB_FILE_VERSION)));
     in_.take(2 * sizeof(uint32_t));  // version of the library
     hasOffsets_ = in_.read<char>() != 0;
-    if (version_ < openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) in_.take(1);
     in_.take(36);  // UUID
   }
 
@@ -124,14 +126,14 @@ class ContentsReader {
     in_.read<int64_t>();
     end_ = in_.read<int64_t>();
     ByteReader grid = hasOffsets_ ? ByteReader(bytes_.data(), bytes_.size(), static_cast<size_t>(gridAt)) : in_;
-    if (hasOffsets_ && end_ < static_cast<int64_t>(in_.offset())) throw Error("file is truncated or damaged");
+    if (hasOffsets_ && end_ < static_cast<int64_t>(in_.offset())) damaged();
     checkGrid(grid);
     return entry;
   }
 
   // The lengths at the start of a grid's own data.
-  void checkGrid(ByteReader& grid) const {
-    if (version_ >= openvdb::OPENVDB_FILE_VERSION_NODE_MASK_COMPRESSION) grid.take(sizeof(uint32_t));
+  static void checkGrid(ByteReader& grid) {
+    grid.take(sizeof(uint32_t));  // compression
     metadata(grid);
     text(grid);  // name of the transform's type
   }
@@ -145,7 +147,7 @@ class ContentsReader {
 
 class VdbReader : private openvdb::io::Archive {
  public:
-  explicit VdbReader(const AlignedBytes& bytes) : stream_(bytes.data(), bytes.size()) {
+  explicit VdbReader(const AlignedBytes& bytes) : bytes_(bytes), stream_(bytes.data(), bytes.size()) {
     initialiseOnce();
     ContentsReader contents(bytes);
     entries_ = contents.entries();
@@ -163,6 +165,7 @@ class VdbReader : private openvdb::io::Archive {
 
   openvdb::GridBase::Ptr read(const Entry& entry) {
     openvdb::io::GridDescriptor descriptor;
+    stream_.clear();
     stream_.seekg(static_cast<std::streamoff>(entry.descriptorAt));
     openvdb::GridBase::Ptr grid = descriptor.read(stream_);
     if (hasOffsets_) descriptor.seekToGrid(stream_);
@@ -177,12 +180,12 @@ class VdbReader : private openvdb::io::Archive {
   }
 
  private:
-  // OpenVDB would print a warning about a damaged count of buffers.
   void readTree(openvdb::GridBase& grid) {
-    int32_t buffers = 0;
-    stream_.read(reinterpret_cast<char*>(&buffers), sizeof(buffers));
-    if (buffers != 1) throw Error("file is truncated or damaged");
-    stream_.seekg(-static_cast<std::streamoff>(sizeof(buffers)), std::ios::cur);
+    VdbEncoding encoding;
+    if (grid.isType<openvdb::DoubleGrid>()) encoding.valueSize = sizeof(double);
+    encoding.storedSize = grid.saveFloatAsHalf() ? 2 : encoding.valueSize;
+    encoding.compression = openvdb::io::getDataCompression(stream_);
+    requireSoundTree(bytes_, static_cast<size_t>(stream_.tellg()), encoding);
     grid.readTopology(stream_);
     grid.readBuffers(stream_);
   }
@@ -190,9 +193,10 @@ class VdbReader : private openvdb::io::Archive {
   const Entry& parentOf(const Entry& entry) const {
     for (const Entry& other : entries_)
       if (other.uniqueName == entry.parent && other.parent.empty()) return other;
-    throw Error("file is truncated or damaged");
+    damaged();
   }
 
+  const AlignedBytes& bytes_;
   openvdb::SharedPtr<openvdb::io::StreamMetadata> metadata_ = std::make_shared<openvdb::io::StreamMetadata>();
   MemoryStream stream_;  // refers to metadata_
   std::vector<Entry> entries_;
@@ -239,7 +243,7 @@ AlignedBytes copyOf(const nanovdb::GridHandle<>& handle) {
 openvdb::FloatGrid::Ptr asFloat(const openvdb::GridBase::Ptr& grid) {
   if (auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return floats;
   const auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
-  if (!doubles) throw Error("file is truncated or damaged");
+  if (!doubles) damaged();
   return std::make_shared<openvdb::FloatGrid>(*doubles);
 }
 
@@ -253,7 +257,7 @@ auto guarded(const Body& body) {
   try {
     return body();
   } catch (const std::ios_base::failure&) {
-    throw Error("file is truncated or damaged");
+    damaged();
   }
 }
 
@@ -279,6 +283,8 @@ void describe(VdbReader& reader, const Entry& entry, GridInfo& info) {
     describeTree(*reinterpret_cast<nanovdb::FloatGrid*>(tree.data()), tree.size(), info);
   } catch (const Error& e) {
     info.problem = e.message();
+  } catch (const std::exception& e) {
+    info.problem = fmt::format("is damaged: {}", e.what());
   }
 }
 
@@ -344,13 +350,7 @@ std::vector<GridInfo> vdbInfo(const AlignedBytes& bytes) {
 }
 
 bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* out, size_t size) try {
-  // Blosc's own header says how long its buffer is and how long it was: neither may differ.
-  constexpr size_t kHeader = 16;
-  if (compressedSize < kHeader) return false;
-  ByteReader header(compressed, kHeader, 4);
-  const auto expanded = header.read<uint32_t>();
-  header.read<uint32_t>();
-  if (expanded != size || header.read<uint32_t>() != compressedSize) return false;
+  requireWholeBlosc(compressed, compressedSize);
   std::vector<std::byte> framed(sizeof(uint64_t) + compressedSize);
   std::memcpy(framed.data(), &compressedSize, sizeof(uint64_t));
   std::memcpy(framed.data() + sizeof(uint64_t), compressed, compressedSize);

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 #include <ostream>
 
 namespace virga {
@@ -55,6 +55,23 @@ Bounds axisAlignedBounds(const DenseVolume& volume) {
   return box;
 }
 
+// The transform that puts the voxels where the file's box says.
+Matrix4 indexToBox(const VolFile& file) {
+  const Vec3 lo = file.bounds.lo, extent = file.bounds.extent();
+  const double dx = static_cast<double>(extent.x) / file.nx, dy = static_cast<double>(extent.y) / file.ny,
+               dz = static_cast<double>(extent.z) / file.nz;
+  return Matrix4::translation(static_cast<double>(lo.x) + 0.5 * dx, static_cast<double>(lo.y) + 0.5 * dy,
+                              static_cast<double>(lo.z) + 0.5 * dz) *
+         Matrix4::scaling(dx, dy, dz);
+}
+
+std::string problemOf(const AlignedBytes& bytes) try {
+  loadVol(bytes, {}, {});
+  return "";
+} catch (const Error& e) {
+  return e.message();
+}
+
 }  // namespace
 
 bool isVol(const AlignedBytes& bytes) {
@@ -88,9 +105,7 @@ std::shared_ptr<const Grid> loadVol(const AlignedBytes& bytes, const VolumeReque
   return Grid::dense(file.nx, file.ny, file.nz, floatsOf(file), options);
 }
 
-RgbGrid loadRgbVolume(const std::filesystem::path& path) try {
-  const AlignedBytes bytes = readFile(path);
-  if (!isVol(bytes)) throw Error("is not a .vol file; only those hold colours");
+RgbGrid loadRgbVol(const AlignedBytes& bytes) {
   const VolFile file = parseVol(bytes);
   if (file.channels != 1 && file.channels != 3)
     throw Error(fmt::format("has {} channels where 3 or 1 are wanted", file.channels));
@@ -99,9 +114,6 @@ RgbGrid loadRgbVolume(const std::filesystem::path& path) try {
   for (size_t i = 0; i < colours.size(); ++i)
     colours[i] = file.channels == 1 ? Rgb(values[i]) : Rgb(values[3 * i], values[3 * i + 1], values[3 * i + 2]);
   return RgbGrid(file.nx, file.ny, file.nz, std::move(colours));
-} catch (const Error& e) {
-  if (e.details().position.known()) throw;
-  throw e.at(inFile(path));
 }
 
 GridInfo volInfo(const AlignedBytes& bytes) {
@@ -109,32 +121,18 @@ GridInfo volInfo(const AlignedBytes& bytes) {
   const std::vector<float> values = floatsOf(file);
   GridInfo info;
   info.kind = "fog volume", info.valueType = "float", info.format = "vol 3";
-  if (file.channels != 1) info.problem = fmt::format("has {} channels where one is wanted", file.channels);
+  info.problem = problemOf(bytes);
   info.activeVoxels = file.voxels();
   info.indexHi = {file.nx - 1, file.ny - 1, file.nz - 1};
   info.worldBounds = file.bounds;
+  info.indexToWorld = indexToBox(file);
   info.bytes = values.size() * sizeof(float);
   const auto [lo, hi] = std::minmax_element(values.begin(), values.end());
-  double sum = 0;
-  for (float value : values) sum += value;
-  if (std::isfinite(sum))
-    info.minimum = *lo, info.maximum = *hi, info.mean = static_cast<float>(sum / static_cast<double>(values.size()));
-  const Vec3 extent = file.bounds.extent(),
-             step{extent.x / static_cast<float>(file.nx), extent.y / static_cast<float>(file.ny),
-                  extent.z / static_cast<float>(file.nz)};
-  info.indexToWorld = Matrix4::translation(file.bounds.lo.x + 0.5 * step.x, file.bounds.lo.y + 0.5 * step.y,
-                                           file.bounds.lo.z + 0.5 * step.z) *
-                      Matrix4::scaling(step.x, step.y, step.z);
+  const double sum = std::accumulate(values.begin(), values.end(), 0.0);
+  if (!std::isfinite(sum)) return info;
+  info.minimum = *lo, info.maximum = *hi;
+  info.mean = static_cast<float>(sum / static_cast<double>(values.size()));
   return info;
-}
-
-Bounds volBounds(const std::filesystem::path& path) try {
-  const AlignedBytes bytes = readFile(path);
-  if (!isVol(bytes)) throw Error("is not a .vol file; others carry a transform, not a box");
-  return parseVol(bytes).bounds;
-} catch (const Error& e) {
-  if (e.details().position.known()) throw;
-  throw e.at(inFile(path));
 }
 
 void writeVol(const std::filesystem::path& path, const DenseVolume& volume) {

@@ -21,6 +21,7 @@ VolFile parseVol(const AlignedBytes& bytes);
 
 std::shared_ptr<const Grid> loadVol(const AlignedBytes& bytes, const VolumeRequest& request,
                                     const GridOptions& options);
+RgbGrid loadRgbVol(const AlignedBytes& bytes);
 GridInfo volInfo(const AlignedBytes& bytes);
 
 }  // namespace virga

@@ -41,6 +41,20 @@ std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const 
   });
 }
 
+RgbGrid loadRgbVolume(const std::filesystem::path& path) {
+  return withFile(path, [&](const AlignedBytes& bytes) {
+    if (!isVol(bytes)) throw Error("is not a .vol file; only those hold colours");
+    return loadRgbVol(bytes);
+  });
+}
+
+Bounds volBounds(const std::filesystem::path& path) {
+  return withFile(path, [&](const AlignedBytes& bytes) {
+    if (!isVol(bytes)) throw Error("is not a .vol file; others carry a transform, not a box");
+    return parseVol(bytes).bounds;
+  });
+}
+
 std::vector<GridInfo> listGrids(const std::filesystem::path& path) {
   return withFile(path, [&](const AlignedBytes& bytes) {
     if (isVol(bytes)) return std::vector<GridInfo>{volInfo(bytes)};

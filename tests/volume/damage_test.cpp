@@ -10,6 +10,9 @@
 #include "volume/samples.h"
 #include "volume/volume_io.h"
 
+// OpenVDB forgets the nodes it has made so far when reading a tree's topology fails; it holds them in bare pointers.
+extern "C" const char* __lsan_default_suppressions() { return "leak:::readTopology(\nleak:libopenvdb"; }
+
 namespace virga {
 namespace {
 
@@ -86,6 +89,13 @@ TEST_F(Damage, VdbOfHalves) {
   test::SampleGrid grid = smallGrid();
   grid.type = test::SampleGrid::Type::halves;
   test::writeVdbSample(folder_ / "a", {grid, grid});
+  damage(test::bytesOf(folder_ / "a"), 1200, 200);
+}
+
+TEST_F(Damage, VdbOfDoubles) {
+  test::SampleGrid grid = smallGrid();
+  grid.type = test::SampleGrid::Type::doubles;
+  test::writeVdbSample(folder_ / "a", {grid});
   damage(test::bytesOf(folder_ / "a"), 1200, 200);
 }
 

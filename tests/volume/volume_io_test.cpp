@@ -213,7 +213,7 @@ TEST_F(VolumeIo, BrokenFilesSayWhatIsWrong) {
   expect(cut(vdb, 30), "file is truncated or damaged");
   expect(cut(vdb, vdb.size() / 2), "file is truncated or damaged");
   expect(cut(vdb, vdb.size() - 10), "file is truncated or damaged");
-  expect(set(vdb, 8, uint32_t{999}), "has VDB file version 999; known are 220 to 224");
+  expect(set(vdb, 8, uint32_t{999}), "has VDB file version 999; known are 222 to 224");
 
   test::writeNvdbSample(folder_ / "a.nvdb", block(), test::NvdbCodec::none);
   const std::vector<char> nvdb = test::bytesOf(folder_ / "a.nvdb");
