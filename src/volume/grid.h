@@ -18,8 +18,8 @@ struct GridOptions {
   int cellSize = 0;   ///< edge of a coarse cell in voxels; 0: 16 to 32 cells along the longest axis, 8 voxels at 128^3
   int maxCells = 64;  ///< per axis; a cellSize that would give more is raised
   Storage storage = Storage::automatic;  ///< of a VDB: dense where that costs at most the bytes below
-  size_t denseBelow = size_t{4} << 20;   ///< bytes of a dense box that are always affordable
-  double denseRatio = 4;                 ///< bytes of a dense box, relative to the tree's
+  size_t denseBelow = size_t{8} << 20;   ///< bytes of a dense box that are always affordable
+  double denseRatio = 2;                 ///< bytes of a dense box, relative to the tree's
 };
 
 /// An immutable scalar field with its majorant and mean grids. All values are finite and >= 0 (checked when it is
