@@ -29,7 +29,7 @@ struct DiscreteView {
       (cdf[middle] <= u ? lo : hi) = middle;
     }
     const float p = probability(lo);
-    return {lo, p, p > 0 ? std::fmin((u - cdf[lo]) / p, 0x1.fffffep-1f) : 0};
+    return {lo, p, p > 0 ? std::min((u - cdf[lo]) / p, 0x1.fffffep-1f) : 0};
   }
 };
 

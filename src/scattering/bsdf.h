@@ -44,7 +44,7 @@ struct Phong {
     const float d = maxComponent(diffuse), s = maxComponent(specular);
     return d + s > 0 ? d / (d + s) : 1;
   }
-  VIRGA_HD static float cosAlpha(Vec3 wo, Vec3 wi) { return std::fmax(0.f, wo.z * wi.z - wo.x * wi.x - wo.y * wi.y); }
+  VIRGA_HD static float cosAlpha(Vec3 wo, Vec3 wi) { return std::max(0.f, wo.z * wi.z - wo.x * wi.x - wo.y * wi.y); }
   VIRGA_HD Rgb value(Vec3 wo, Vec3 wi) const {
     if (wo.z <= 0 || wi.z <= 0) return {};
     return diffuse * kInvPi + specular * ((exponent + 2) / kTwoPi * std::pow(cosAlpha(wo, wi), exponent));
@@ -61,7 +61,7 @@ struct Phong {
       wi = cosineHemisphere(u);
     } else {
       const float c = std::pow(1 - u.x, 1 / (exponent + 1));
-      const Vec3 lobe = sphericalDirection(std::sqrt(std::fmax(0.f, 1 - c * c)), c, kTwoPi * u.y);
+      const Vec3 lobe = sphericalDirection(std::sqrt(std::max(0.f, 1 - c * c)), c, kTwoPi * u.y);
       wi = Frame(Vec3(-wo.x, -wo.y, wo.z)).toWorld(lobe);
     }
     const float p = pdf(wo, wi);

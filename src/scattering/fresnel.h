@@ -29,7 +29,7 @@ VIRGA_HD inline float fresnelConductor(float cosIncident, float eta, float k) {
   const float c2 = cosIncident * cosIncident, s2 = 1 - c2;
   const float e2 = eta * eta - k * k - s2;
   const float a2b2 = std::sqrt(e2 * e2 + 4 * eta * eta * k * k);
-  const float a = std::sqrt(std::fmax(0.f, 0.5f * (a2b2 + e2)));
+  const float a = std::sqrt(std::max(0.f, 0.5f * (a2b2 + e2)));
   const float perpendicular = (a2b2 + c2 - 2 * cosIncident * a) / (a2b2 + c2 + 2 * cosIncident * a);
   const float x = c2 * a2b2 + s2 * s2, y = 2 * cosIncident * a * s2;
   return 0.5f * perpendicular * (1 + (x - y) / (x + y));

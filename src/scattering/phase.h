@@ -37,7 +37,7 @@ struct HenyeyGreenstein {
     const float a = std::fabs(g);
     const float r = (1 - a) / (1 - a + 2 * a * u.x);
     const float v = 2 * (1 - u.x) * r * r * (1 + a * u.x);
-    const float sinTheta = std::sqrt(std::fmax(0.f, v * (2 - v)));
+    const float sinTheta = std::sqrt(std::max(0.f, v * (2 - v)));
     const Vec3 wi = Frame(g < 0 ? wo : -wo).toWorld(sphericalDirection(sinTheta, 1 - v, kTwoPi * u.y));
     const float p = atHeight(v);
     return {wi, p, p};

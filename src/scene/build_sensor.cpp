@@ -17,22 +17,22 @@ constexpr float kRadiansPerDegree = kPi / 180;
 enum class FovAxis { x, y, diagonal, smaller, larger };
 constexpr std::string_view kFovAxes[] = {"x", "y", "diagonal", "smaller", "larger"};
 
-// Offsets of a truncated Gaussian, exp(-x^2 / (2 s^2)) less its value at the radius (as Mitsuba has it), at equal steps of its
-// cumulative distribution.
+// A truncated Gaussian, exp(-x^2 / (2 s^2)) less its value at the radius (as Mitsuba has it).
 PixelFilter gaussianFilter(float sigma) {
   PixelFilter filter{PixelFilter::Kind::gaussian, 4 * sigma, {}};
   constexpr int kSteps = 1 << 14;
   const double radius = static_cast<double>(filter.radius), s = static_cast<double>(sigma);
   const auto value = [&](double x) { return std::exp(-x * x / (2 * s * s)) - std::exp(-radius * radius / (2 * s * s)); };
-  std::vector<double> cdf(kSteps + 1, 0.0);
+  // What lies beyond the offset radius * (1 - i / kSteps), summed from the tail inward: small shares keep their digits.
+  std::vector<double> beyond(kSteps + 1, 0.0);
   for (int i = 0; i < kSteps; ++i)
-    cdf[static_cast<size_t>(i + 1)] = cdf[static_cast<size_t>(i)] + value(radius * ((i + 0.5) * 2 / kSteps - 1));
+    beyond[static_cast<size_t>(i + 1)] = beyond[static_cast<size_t>(i)] + value(radius * (1 - (i + 0.5) / kSteps));
   size_t k = 0;
   for (size_t i = 0; i <= PixelFilter::kTableSize; ++i) {
-    const double target = cdf.back() * static_cast<double>(i) / PixelFilter::kTableSize;
-    while (k + 1 < kSteps && cdf[k + 1] < target) ++k;
-    const double within = (target - cdf[k]) / (cdf[k + 1] - cdf[k]);
-    filter.inverseCdf[i] = static_cast<float>(radius * ((static_cast<double>(k) + within) * 2 / kSteps - 1));
+    const double v = static_cast<double>(i) / PixelFilter::kTableSize, target = beyond.back() * v * v;
+    while (k + 1 < kSteps && beyond[k + 1] < target) ++k;
+    const double within = (target - beyond[k]) / (beyond[k + 1] - beyond[k]);
+    filter.tail[i] = static_cast<float>(radius * (1 - (static_cast<double>(k) + within) / kSteps));
   }
   return filter;
 }

@@ -16,7 +16,9 @@ struct PixelFilter {
 
   Kind kind = Kind::box;
   float radius = 0.5f;                            ///< [pixels]
-  std::array<float, kTableSize + 1> inverseCdf{};  ///< gaussian: offset [pixels] at i / kTableSize
+/// Gaussian: offset [pixels] beyond which lies the share v^2 of a half of the filter, at v = i / kTableSize. The square root
+  /// resolves the tails, where the offset as a function of the share itself is steep.
+  std::array<float, kTableSize + 1> tail{};
 
   /// Offset from the pixel's centre [pixels].
   VIRGA_HD Vec2 sample(Vec2 u) const { return {sample1D(u.x), sample1D(u.y)}; }
@@ -25,9 +27,10 @@ struct PixelFilter {
   VIRGA_HD float sample1D(float u) const {
     if (kind == Kind::box) return (2 * u - 1) * radius;
     if (kind == Kind::tent) return u < 0.5f ? radius * (std::sqrt(2 * u) - 1) : radius * (1 - std::sqrt(2 - 2 * u));
-    const float x = u * kTableSize;
-    const int i = static_cast<int>(x);
-    return lerp(inverseCdf[static_cast<size_t>(i)], inverseCdf[static_cast<size_t>(i + 1)], x - static_cast<float>(i));
+    const float side = 2 * u - 1, x = std::sqrt(1 - std::fabs(side)) * kTableSize;
+    const int i = x < kTableSize ? static_cast<int>(x) : kTableSize - 1;
+    const float offset = lerp(tail[static_cast<size_t>(i)], tail[static_cast<size_t>(i + 1)], x - static_cast<float>(i));
+    return std::copysign(offset, side);
   }
 };
 
@@ -40,15 +43,15 @@ struct CameraRay {
 struct PerspectiveCamera {
   Affine toWorld;
   float tanX = 1, tanY = 1;      ///< tangents of half the field of view
-  float shiftX = 0, shiftY = 0;  ///< principal point offset, in widths and heights of the whole film
+  float shiftX = 0, shiftY = 0;  ///< of the film against the optical axis, in its widths and heights (principal point offset)
   float nearClip = 1e-2f, farClip = 1e4f;  ///< distances along the axis [unit]
   int filmWidth = 1, filmHeight = 1;       ///< of the whole film [pixels]
   int cropX = 0, cropY = 0, width = 1, height = 1;  ///< the part that is rendered [pixels]
 
   /// (x, y) in pixels of the crop window, from its top left corner.
   VIRGA_HD CameraRay ray(float x, float y) const {
-    const float sx = 1 - 2 * ((x + static_cast<float>(cropX)) / static_cast<float>(filmWidth) - shiftX);
-    const float sy = 1 - 2 * ((y + static_cast<float>(cropY)) / static_cast<float>(filmHeight) - shiftY);
+    const float sx = 1 - 2 * ((x + static_cast<float>(cropX)) / static_cast<float>(filmWidth) + shiftX);
+    const float sy = 1 - 2 * ((y + static_cast<float>(cropY)) / static_cast<float>(filmHeight) + shiftY);
     const Vec3 local = normalize(Vec3(sx * tanX, sy * tanY, 1));
     const Vec3 d = normalize(toWorld.vector(local));
     const float inverseZ = 1 / local.z;

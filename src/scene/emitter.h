@@ -47,7 +47,7 @@ struct EnvironmentView {
     const Vec3 local = toLocal.vector(w);
     const Vec2 uv = toUv(local);
     const int i = clampIndex(uv.x, width), j = clampIndex(uv.y, height);
-    const float sinTheta = std::sqrt(std::fmax(0.f, local.x * local.x + local.z * local.z));
+    const float sinTheta = std::sqrt(std::max(0.f, local.x * local.x + local.z * local.z));
     return solidAngleDensity(rows.probability(j) * rowTable(j).probability(i), sinTheta);
   }
 
@@ -140,7 +140,7 @@ VIRGA_HD inline LightPoint uniformPointOnShape(const ShapeView& shape, const Emi
 /// 1 - cos of the half angle under which a sphere is seen from distance d > radius, without cancellation.
 VIRGA_HD inline float coneHeight(float radius, float d) {
   const float s2 = square(radius / d);
-  return s2 / (1 + std::sqrt(std::fmax(0.f, 1 - s2)));
+  return s2 / (1 + std::sqrt(std::max(0.f, 1 - s2)));
 }
 
 /// Density [1/sr, seen from x] of a point that is chosen uniformly on an area light.
@@ -180,15 +180,14 @@ VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const Emit
   if (!(d > shape.radius * (1 + 1e-3f)) || shape.orientation < 0)
     return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
   const float height = coneHeight(shape.radius, d);
-  const Vec3 wi = Frame(toCenter / d).toWorld(uniformCone(u, height));
-  // Nearest hit of the ray with the sphere; a ray that grazes it by rounding takes the tangent point.
-  const float along = dot(wi, toCenter);
-  const float miss2 = lengthSquared(toCenter - wi * along);
+  const Vec3 local = uniformCone(u, height);
+  // By the triangle of receiver, centre and hit: the ray passes the centre at d sin(theta), and half the chord is r times the
+  // cosine at the light. From afar the hit point's own coordinates would not tell.
+  const float miss2 = d * d * (local.x * local.x + local.y * local.y);
   const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
-  const float t = along - half;
-  const Vec3 on = x + wi * t;
-  const float uniform = uniformPointPdf(emitter, x, on, normalize(on - shape.center));
-  return {wi, t, emitter.value, 1 / (kTwoPi * height), false, uniform};
+  const float t = d * local.z - half;
+  const float uniform = half > 0 ? t * t * shape.radius / (half * emitter.area) : 0;
+  return {Frame(toCenter / d).toWorld(local), t, emitter.value, 1 / (kTwoPi * height), false, uniform};
 }
 
 }  // namespace virga

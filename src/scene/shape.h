@@ -68,7 +68,7 @@ VIRGA_HD inline SurfacePoint surfacePoint(const ShapeView& shape, const Ray& ray
     s.p = q - shape.normal * dot(q - shape.center, shape.normal);
     s.geometricNormal = s.shadingNormal = shape.normal * shape.orientation;
   }
-  s.epsilon = kHitError * std::fmax(maxComponent(abs(s.p)), 1e-2f * sceneScale);
+  s.epsilon = kHitError * std::max(maxComponent(abs(s.p)), 1e-2f * sceneScale);
   return s;
 }
 

@@ -54,7 +54,7 @@ struct EquiangularSegment {
       const Vec3 toLight = y - s.ray.o;
       foot = dot(toLight, s.ray.d);
       // A light on the ray would leave no width to sample; the floor keeps the density finite and exact for what is drawn.
-      height = std::fmax(length(toLight - s.ray.d * foot), 1e-4f * std::fmax(std::fabs(foot), 1e-12f));
+      height = std::max(length(toLight - s.ray.d * foot), 1e-4f * std::max(std::fabs(foot), 1e-12f));
       start = s.t0 - foot;
       // atan(b) - atan(a) = atan2(b - a, 1 + a b)
       range = std::isinf(s.t1) ? std::atan2(height, start)

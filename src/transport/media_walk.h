@@ -83,7 +83,7 @@ VIRGA_HD bool walkPlaces(const SceneView& scene, const Rays& rays, const Ray& ra
       }
       if (!visit(t)) return false;
       const float here = list.items[last - 1].t, next = last < list.count ? list.items[last].t : kInfinity;
-      const Vec3 behind = ray.at(std::fmin(here + kBehindPlace * (scale + here), 0.5f * (here + next)));
+      const Vec3 behind = ray.at(std::min(here + kBehindPlace * (scale + here), 0.5f * (here + next)));
       applyPlace(scene, rays, list.items + first, last - first, behind, media);
       from = std::nextafter(here, kInfinity);
     }
@@ -127,7 +127,7 @@ VIRGA_HD inline Collision sampleCollision(const SceneView& scene, const MediaRay
   Collision nearest;
   for (int i = 0; i < r.media.count(); ++i) {
     const int medium = r.media.medium(i);
-    const float t = sampleFreeFlight(scene.media[medium], r.ray, t0, std::fmin(t1, nearest.t), random);
+    const float t = sampleFreeFlight(scene.media[medium], r.ray, t0, std::min(t1, nearest.t), random);
     if (t < nearest.t) nearest = {t, medium};
   }
   return nearest;

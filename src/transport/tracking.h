@@ -21,8 +21,8 @@ VIRGA_HD inline ClippedRange clipToBox(Vec3 o, Vec3 d, Vec3 lo, Vec3 hi, float t
     }
     const float inverse = 1 / d[axis];
     const float a = (lo[axis] - o[axis]) * inverse, b = (hi[axis] - o[axis]) * inverse;
-    t0 = std::fmax(t0, std::fmin(a, b));
-    t1 = std::fmin(t1, std::fmax(a, b));
+    t0 = std::max(t0, std::min(a, b));
+    t1 = std::min(t1, std::max(a, b));
   }
   return {t0, t1};
 }
@@ -47,9 +47,9 @@ VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0
   }
   for (float t = t0; t < t1;) {
     const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
-    const float end = std::fmin(next[axis], t1);
+    const float end = std::min(next[axis], t1);
     if (end > t && !visit(t, end, grid.cell(cell[0], cell[1], cell[2]))) return false;
-    t = std::fmax(t, end);
+    t = std::max(t, end);
     next[axis] += delta[axis];
     cell[axis] += step[axis];
     if (cell[axis] < 0 || cell[axis] >= count[axis]) {

@@ -318,7 +318,7 @@ class PathTracer {
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
     if (path.depth < options_.rrDepth) return true;
-    const float q = std::fmin(maxComponent(path.throughput) * path.etaScale, kMaxSurvival);
+    const float q = std::min(maxComponent(path.throughput) * path.etaScale, kMaxSurvival);
     if (!(sampler.random() < q)) return false;
     path.throughput *= 1 / q;
     return true;
