@@ -143,6 +143,9 @@ VIRGA_HD inline float coneHeight(float radius, float d) {
   return s2 / (1 + std::sqrt(std::max(0.f, 1 - s2)));
 }
 
+/// A sphere light is sampled by the cone that it fills, as seen from outside at distance d of its centre.
+VIRGA_HD inline bool seenAsCone(const ShapeView& sphere, float d) { return d > sphere.radius && sphere.orientation > 0; }
+
 /// Density [1/sr, seen from x] of a point that is chosen uniformly on an area light.
 VIRGA_HD inline float uniformPointPdf(const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
   const Vec3 toLight = on - x;
@@ -155,7 +158,7 @@ VIRGA_HD inline float uniformPointPdf(const EmitterView& emitter, Vec3 x, Vec3 o
 VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
   if (shape.kind == ShapeView::Kind::sphere) {
     const float d = distance(x, shape.center);
-    if (d > shape.radius * (1 + 1e-3f) && shape.orientation > 0) return 1 / (kTwoPi * coneHeight(shape.radius, d));
+    if (seenAsCone(shape, d)) return 1 / (kTwoPi * coneHeight(shape.radius, d));
   }
   return uniformPointPdf(emitter, x, on, normal);
 }
@@ -177,15 +180,14 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
 VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
   const Vec3 toCenter = shape.center - x;
   const float d = length(toCenter);
-  if (!(d > shape.radius * (1 + 1e-3f)) || shape.orientation < 0)
-    return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
+  if (!seenAsCone(shape, d)) return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
   const float height = coneHeight(shape.radius, d);
   const Vec3 local = uniformCone(u, height);
   // By the triangle of receiver, centre and hit: the ray passes the centre at d sin(theta), and half the chord is r times the
   // cosine at the light. From afar the hit point's own coordinates would not tell.
   const float miss2 = d * d * (local.x * local.x + local.y * local.y);
   const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
-  const float t = d * local.z - half;
+  const float t = std::fmax(0.f, d * local.z - half);
   const float uniform = half > 0 ? t * t * shape.radius / (half * emitter.area) : 0;
   return {Frame(toCenter / d).toWorld(local), t, emitter.value, 1 / (kTwoPi * height), false, uniform};
 }

@@ -87,7 +87,8 @@ ChangeSet differences(const SceneDescription& before, const SceneDescription& af
 
 namespace {
 
-/// The side of the nearest surface along a ray that has a say about media: where it is and what it says.
+/// The nearest surface along a ray that declares media: where it is, and its interior if the ray meets it from inside. What it
+/// says about its exterior holds next to it, not at the start of the ray: volumes may begin in between.
 struct Surroundings {
   float t = kInfinity;
   int medium = MediumTransition::kNone;
@@ -99,7 +100,7 @@ Surroundings surfaceSurroundings(const SceneView& view, const RayScene& surfaces
     if (!hit.found()) return {};
     const ShapeView& shape = view.surfaces[hit.shape];
     const bool outside = dot(surfacePoint(shape, ray, hit, view.scale).geometricNormal, ray.d) < 0;
-    if (shape.media.replaces) return {hit.t, outside ? shape.media.exterior : shape.media.interior};
+    if (shape.media.replaces) return {hit.t, outside ? MediumTransition::kNone : shape.media.interior};
     from = std::nextafter(hit.t, kInfinity);
   }
 }
@@ -107,8 +108,8 @@ Surroundings surfaceSurroundings(const SceneView& view, const RayScene& surfaces
 }  // namespace
 
 MediaState mediaAt(const Scene& scene, Vec3 p) {
-  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside; and the first
-  // boundary or surface that declares media on both sides tells which one it starts in.
+  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those that
+  // replace, the nearest is the innermost.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
   Surroundings base = surfaceSurroundings(scene.view, *scene.surfaceRays, ray);
   MediaState state;
@@ -121,7 +122,7 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
       if (!seen.insert(c.shape).second) continue;
       const MediumTransition& media = scene.view.boundaries[c.shape];
       if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
-      if (media.replaces && c.t < base.t) base = {c.t, c.entering ? media.exterior : media.interior};
+      if (media.replaces && c.t < base.t) base = {c.t, c.entering ? MediumTransition::kNone : media.interior};
     }
     if (list.complete) break;
     // Once more from the last one: others may lie at the same distance.

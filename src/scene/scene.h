@@ -69,8 +69,8 @@ struct ChangeSet {
 /// By the ids of the objects in both descriptions.
 ChangeSet differences(const SceneDescription& before, const SceneDescription& after);
 
-/// The media around a point, away from all surfaces and boundaries: closed null boundaries that it lies in, and what the nearest
-/// surface or boundary that replaces says about its side.
+/// The media around a point, away from all surfaces and boundaries, by the closed shapes that it lies in: the interiors of null
+/// boundaries, or of the innermost shape that replaces.
 MediaState mediaAt(const Scene&, Vec3 p);
 
 /// 64 bits of everything that the description says, for metadata.
