@@ -15,8 +15,8 @@ struct PixelFilter {
   static constexpr int kTableSize = 256;
 
   Kind kind = Kind::box;
-  float radius = 0.5f;                            ///< [pixels]
-/// Gaussian: offset [pixels] beyond which lies the share v^2 of a half of the filter, at v = i / kTableSize. The square root
+  float radius = 0.5f;  ///< [pixels]
+  /// Gaussian: offset [pixels] beyond which lies the share v^2 of a half of the filter, at v = i / kTableSize. The square root
   /// resolves the tails, where the offset as a function of the share itself is steep.
   std::array<float, kTableSize + 1> tail{};
 
