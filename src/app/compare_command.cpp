@@ -10,7 +10,7 @@
 #include "app/output_files.h"
 #include "app/usage_error.h"
 #include "core/error.h"
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 #include "image/film.h"
 #include "image/image_io.h"
 #include "image/metrics.h"

@@ -7,7 +7,7 @@
 #include "app/options.h"
 #include "app/ready_scene.h"
 #include "app/usage_error.h"
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 #include "volume/procedural.h"
 #include "volume/volume_io.h"
 

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "app/usage_error.h"
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 
 namespace virga::app {
 

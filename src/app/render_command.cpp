@@ -17,7 +17,7 @@
 #include "app/render_report.h"
 #include "app/scene_source.h"
 #include "app/stopwatch.h"
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 #include "scene/builder.h"
 
 namespace virga::app {

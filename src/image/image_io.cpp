@@ -11,7 +11,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 #include "image/formats.h"
 
 namespace virga {

@@ -2,9 +2,7 @@
 #include "volume/file_bytes.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <atomic>
 #include <cerrno>
 #include <fstream>
 #include <system_error>
@@ -16,19 +14,6 @@ namespace {
 [[noreturn]] void fail(const fs::path& path, const std::string& what, int code) {
   throw Error(fmt::format("{}: {}", what, std::generic_category().message(code)), {inFile(path), "", {}});
 }
-
-// Removes the temporary file unless it has been renamed away.
-struct Temporary {
-  explicit Temporary(const fs::path& target) : path(target) {
-    static std::atomic<unsigned> count{0};
-    path += fmt::format(".{}-{}.tmp", ::getpid(), count++);
-  }
-  ~Temporary() {
-    std::error_code ignored;
-    fs::remove(path, ignored);
-  }
-  fs::path path;
-};
 
 }  // namespace
 
@@ -49,20 +34,6 @@ AlignedBytes readFile(const fs::path& path) {
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
   if (!in) fail(path, "cannot read the file", EIO);
   return bytes;
-}
-
-void writeAtomically(const fs::path& path, const std::function<void(std::ostream&)>& write) {
-  const Temporary temporary(path);
-  {
-    std::ofstream out(temporary.path, std::ios::binary | std::ios::trunc);
-    if (!out) fail(path, "cannot write the file", errno);
-    write(out);
-    out.close();
-    if (!out) fail(path, "cannot write the file", errno != 0 ? errno : EIO);
-  }
-  std::error_code code;
-  fs::rename(temporary.path, path, code);
-  if (code) fail(path, "cannot write the file", code.value());
 }
 
 }  // namespace virga

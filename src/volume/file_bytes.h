@@ -3,8 +3,6 @@
 
 #include <cstring>
 #include <filesystem>
-#include <functional>
-#include <iosfwd>
 #include <type_traits>
 
 #include "core/error.h"
@@ -17,10 +15,6 @@ SourcePosition inFile(const std::filesystem::path& path);
 
 /// The whole file; Error where it cannot be read.
 AlignedBytes readFile(const std::filesystem::path& path);
-
-/// Lets `write` fill a temporary file in the same folder and then renames it to `path`. On failure nothing is left
-/// behind.
-void writeAtomically(const std::filesystem::path& path, const std::function<void(std::ostream&)>& write);
 
 /// Reads little-endian values one after the other and throws Error where the bytes end.
 class ByteReader {

@@ -9,7 +9,7 @@
 
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
-#include "volume/vdb_file.h"
+#include "volume/vdb_module.h"
 
 namespace virga {
 namespace {
@@ -130,7 +130,7 @@ void unblosc(const Entry& entry, AlignedBytes& out) {
   for (size_t at = 0; at < out.size(); at += kChunk) {
     const auto size = in.read<uint64_t>();
     const std::byte* data = in.take(size);
-    if (!expandBlosc(data, size, out.data() + at, std::min(kChunk, out.size() - at)))
+    if (!vdbModule().expandBlosc(data, size, out.data() + at, std::min(kChunk, out.size() - at)))
       damaged(entry, "cannot be decompressed: file is damaged");
   }
 }

@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <ostream>
+#include <sstream>
+
+#include "core/atomic_write.h"
 
 namespace virga {
 namespace {
@@ -137,14 +139,14 @@ GridInfo volInfo(const AlignedBytes& bytes) {
 
 void writeVol(const std::filesystem::path& path, const DenseVolume& volume) {
   const Bounds box = axisAlignedBounds(volume);
-  writeAtomically(path, [&](std::ostream& out) {
-    out.write(kMagic, sizeof(kMagic));
-    put(out, static_cast<uint8_t>(kVersion));
-    for (int32_t n : {kFloat32, volume.nx, volume.ny, volume.nz, 1}) put(out, n);
-    for (float x : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z}) put(out, x);
-    out.write(reinterpret_cast<const char*>(volume.values.data()),
-              static_cast<std::streamsize>(volume.values.size() * sizeof(float)));
-  });
+  std::ostringstream out;
+  out.write(kMagic, sizeof(kMagic));
+  put(out, static_cast<uint8_t>(kVersion));
+  for (int32_t n : {kFloat32, volume.nx, volume.ny, volume.nz, 1}) put(out, n);
+  for (float x : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z}) put(out, x);
+  out.write(reinterpret_cast<const char*>(volume.values.data()),
+            static_cast<std::streamsize>(volume.values.size() * sizeof(float)));
+  writeAtomically(path, std::move(out).str());
 }
 
 }  // namespace virga

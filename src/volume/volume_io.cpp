@@ -3,9 +3,10 @@
 
 #include <fmt/format.h>
 
+#include "core/atomic_write.h"
 #include "volume/file_bytes.h"
 #include "volume/nvdb_file.h"
-#include "volume/vdb_file.h"
+#include "volume/vdb_module.h"
 #include "volume/vol_file.h"
 
 namespace virga {
@@ -35,7 +36,7 @@ std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const 
                                        const GridOptions& options) {
   return withFile(path, [&](const AlignedBytes& bytes) {
     if (isVol(bytes)) return loadVol(bytes, request, options);
-    if (isVdb(bytes)) return loadVdb(bytes, request, options);
+    if (isVdb(bytes)) return vdbModule().load(bytes, request, options);
     if (isNvdb(bytes)) return loadNvdb(bytes, request, options);
     refuseFormat();
   });
@@ -58,10 +59,18 @@ Bounds volBounds(const std::filesystem::path& path) {
 std::vector<GridInfo> listGrids(const std::filesystem::path& path) {
   return withFile(path, [&](const AlignedBytes& bytes) {
     if (isVol(bytes)) return std::vector<GridInfo>{volInfo(bytes)};
-    if (isVdb(bytes)) return vdbInfo(bytes);
+    if (isVdb(bytes)) return vdbModule().info(bytes);
     if (isNvdb(bytes)) return nvdbInfo(bytes);
     refuseFormat();
   });
+}
+
+void writeVdb(const std::filesystem::path& path, const DenseVolume& volume) {
+  writeAtomically(path, vdbModule().encodeVdb(volume));
+}
+
+void writeNvdb(const std::filesystem::path& path, const DenseVolume& volume) {
+  writeAtomically(path, vdbModule().encodeNvdb(volume));
 }
 
 }  // namespace virga

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>

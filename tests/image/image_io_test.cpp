@@ -14,7 +14,7 @@
 #include <functional>
 #include <random>
 
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 #include "image/layers.h"
 #include "scratch.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "volume/vdb_file.h"
+#include "volume/vdb_module.h"
 
 // The only file that sees OpenVDB: its headers take half a minute to compile.
 #define NANOVDB_USE_ZIP
@@ -15,16 +15,17 @@
 
 #include <istream>
 #include <mutex>
+#include <sstream>
 #include <streambuf>
 
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
-#include "volume/vdb_walk.h"
+#include "volume/vdb_module/vdb_walk.h"
 
 namespace virga {
 namespace {
 
-constexpr int64_t kMagic = 0x56444220;
+
 constexpr uint32_t kOldestVersion = 222;
 
 void initialiseOnce() {
@@ -95,7 +96,8 @@ class ContentsReader {
 
  private:
   void header() {
-    if (in_.read<int64_t>() != kMagic) throw Error("is not a VDB file");
+    if (!isVdb(bytes_)) throw Error("is not a VDB file");
+    in_.take(sizeof(int64_t));  // the mark
     version_ = in_.read<uint32_t>();
     if (version_ < kOldestVersion || version_ > openvdb::OPENVDB_FILE_VERSION)
       throw Error(fmt::format("has VDB file version {}; known are {} to {}", version_, kOldestVersion,
@@ -311,12 +313,6 @@ class VdbWriter : private openvdb::io::Archive {
   }
 };
 
-}  // namespace
-
-bool isVdb(const AlignedBytes& bytes) {
-  return bytes.size() >= sizeof(kMagic) && ByteReader(bytes.data(), bytes.size()).read<int64_t>() == kMagic;
-}
-
 std::shared_ptr<const Grid> loadVdb(const AlignedBytes& bytes, const VolumeRequest& request,
                                     const GridOptions& options) {
   AlignedBytes tree = guarded([&] {
@@ -361,14 +357,27 @@ bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* 
   return false;
 }
 
-void writeVdb(const std::filesystem::path& path, const DenseVolume& volume) {
-  const openvdb::FloatGrid::Ptr grid = gridOf(volume);
-  writeAtomically(path, [&](std::ostream& out) { VdbWriter().write(out, grid); });
+std::string encodeVdb(const DenseVolume& volume) {
+  std::ostringstream out;
+  VdbWriter().write(out, gridOf(volume));
+  return std::move(out).str();
 }
 
-void writeNvdb(const std::filesystem::path& path, const DenseVolume& volume) {
+std::string encodeNvdb(const DenseVolume& volume) {
   const auto handle = nanovdb::openToNanoVDB(*gridOf(volume), nanovdb::StatsMode::All, nanovdb::ChecksumMode::Full);
-  writeAtomically(path, [&](std::ostream& out) { nanovdb::io::writeGrid(out, handle, nanovdb::io::Codec::ZIP); });
+  nanovdb::io::Segment header(nanovdb::io::Codec::ZIP);
+  header.add(handle);
+  // writeGrid first skips the header, which a string allows only where there is something to skip.
+  std::ostringstream out(std::string(header.memUsage(), '\0'));
+  nanovdb::io::writeGrid(out, handle, nanovdb::io::Codec::ZIP);
+  return std::move(out).str();
 }
+
+}  // namespace
 
 }  // namespace virga
+
+extern "C" __attribute__((visibility("default"))) const virga::VdbModule& virgaVdbModule() {
+  static constexpr virga::VdbModule kModule{virga::loadVdb, virga::vdbInfo, virga::encodeVdb, virga::encodeNvdb, virga::expandBlosc};
+  return kModule;
+}

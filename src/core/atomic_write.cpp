@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/atomic_write.h"
+#include "core/atomic_write.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "volume/vdb_walk.h"
+#include "volume/vdb_module/vdb_walk.h"
 
 #include <algorithm>
 #include <array>
