@@ -57,13 +57,18 @@ void PluginReader::fail(std::string_view parameter, std::string message, std::st
 }
 
 void PluginReader::failHere(std::string message, std::string hint, std::vector<std::string> notes) {
-  fail("", std::move(message), std::move(hint), std::move(notes));
+  const SourcePosition position = node_.typePosition.known() ? node_.typePosition : node_.position;
+  throw Error(std::move(message), {position, std::move(hint), std::move(notes)});
 }
 
 double PluginReader::checkedNumber(std::string_view name, double value, const Range& range) {
   // Values become single precision: what overflows there is as bad as what is not finite.
   if (!std::isfinite(static_cast<float>(value))) fail(name, fmt::format("\"{}\" is too large", name));
-  if (!inRange(value, range)) fail(name, fmt::format("\"{}\" is {}; it must be {}", name, value, rangeText(range)));
+  if (!inRange(value, range)) {
+    const auto single = static_cast<float>(value);  // prints with the digits that were written
+    const std::string text = static_cast<double>(single) == value ? fmt::format("{}", single) : fmt::format("{}", value);
+    fail(name, fmt::format("\"{}\" is {}; it must be {}", name, text, rangeText(range)));
+  }
   return value;
 }
 
