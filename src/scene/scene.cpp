@@ -87,20 +87,20 @@ ChangeSet differences(const SceneDescription& before, const SceneDescription& af
 
 namespace {
 
-/// The nearest surface along a ray that declares media: where it is, and its interior if the ray meets it from inside. What it
-/// says about its exterior holds next to it, not at the start of the ray: volumes may begin in between.
+/// Where a ray first leaves a shape that replaces, and the medium in it.
 struct Surroundings {
   float t = kInfinity;
   int medium = MediumTransition::kNone;
 };
 
-Surroundings surfaceSurroundings(const SceneView& view, const RayScene& surfaces, const Ray& ray) {
+Surroundings enclosingSurface(const SceneView& view, const RayScene& surfaces, const Ray& ray) {
+  std::set<uint32_t> seen;
   for (float from = 0;;) {
     const RayHit hit = surfaces.nearest(ray, from, kInfinity);
     if (!hit.found()) return {};
     const ShapeView& shape = view.surfaces[hit.shape];
-    const bool outside = dot(surfacePoint(shape, ray, hit, view.scale).geometricNormal, ray.d) < 0;
-    if (shape.media.replaces) return {hit.t, outside ? MediumTransition::kNone : shape.media.interior};
+    const bool entering = dot(surfacePoint(shape, ray, hit, view.scale).geometricNormal, ray.d) < 0;
+    if (seen.insert(hit.shape).second && shape.media.replaces && !entering) return {hit.t, shape.media.interior};
     from = std::nextafter(hit.t, kInfinity);
   }
 }
@@ -111,7 +111,7 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
   // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those that
   // replace, the nearest is the innermost.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
-  Surroundings base = surfaceSurroundings(scene.view, *scene.surfaceRays, ray);
+  Surroundings base = enclosingSurface(scene.view, *scene.surfaceRays, ray);
   MediaState state;
   std::set<uint32_t> seen;
   CrossingList list;
@@ -122,7 +122,7 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
       if (!seen.insert(c.shape).second) continue;
       const MediumTransition& media = scene.view.boundaries[c.shape];
       if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
-      if (media.replaces && c.t < base.t) base = {c.t, c.entering ? MediumTransition::kNone : media.interior};
+      if (media.replaces && !c.entering && c.t < base.t) base = {c.t, media.interior};
     }
     if (list.complete) break;
     // Once more from the last one: others may lie at the same distance.
