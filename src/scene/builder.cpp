@@ -44,6 +44,38 @@ void measureBounds(Scene& scene, const Scene::Parts& parts) {
   scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
 }
 
+// In how many boxes a point may lie; no more than `enough` are counted. The deepest place begins at the lower x of one box, the
+// lower y of another and the lower z of a third.
+int deepestOverlap(const std::vector<Bounds>& boxes, int enough) {
+  const auto holding = [](const std::vector<Bounds>& all, int axis, float x) {
+    std::vector<Bounds> some;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(some), [&](const Bounds& b) { return b.lo[axis] <= x && x < b.hi[axis]; });
+    return some;
+  };
+  size_t deepest = 0;
+  const auto limit = static_cast<size_t>(enough);
+  for (const Bounds& a : boxes) {
+    const std::vector<Bounds> inX = holding(boxes, 0, a.lo.x);
+    if (inX.size() <= deepest) continue;
+    for (const Bounds& b : inX) {
+      const std::vector<Bounds> inXY = holding(inX, 1, b.lo.y);
+      if (inXY.size() <= deepest) continue;
+      for (const Bounds& c : inXY) deepest = std::max(deepest, holding(inXY, 2, c.lo.z).size());
+      if (deepest >= limit) return enough;
+    }
+  }
+  return static_cast<int>(deepest);
+}
+
+void warnOfOverlaps(BuildContext& context) {
+  std::vector<Bounds> boxes;
+  for (size_t i = 0; i < context.parts.boundaries.size(); ++i)
+    if (!context.parts.boundaries[i].replaces) boxes.push_back(context.parts.boundaryShapes[i]->bounds);
+  if (deepestOverlap(boxes, MediaState::kCapacity + 1) > MediaState::kCapacity)
+    context.diagnostics.warnings.push_back(fmt::format(
+        "warning: more than {0} volumes may overlap; where more than {0} do, the others are left out", MediaState::kCapacity));
+}
+
 NodePtr onlyChild(PluginReader& reader, std::string_view tag) {
   const std::vector<NodePtr> found = reader.children(tag);
   if (found.size() > 1)
@@ -113,6 +145,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
 
   linkShapes(*scene, *parts);
   measureBounds(*scene, *parts);
+  warnOfOverlaps(context);
   chooseEmittersByPower(context);
   linkViews(*scene, *parts);
   const int declared = scene->view.cameraMedia.base();
