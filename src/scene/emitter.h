@@ -9,7 +9,8 @@
 
 namespace virga {
 
-/// A latitude-longitude picture around the scene: u = 0 at -z of its own frame, 0.25 at +x; v from +y down.
+/// A latitude-longitude picture around the scene: u = 0 at -z of its own frame, 0.25 at +x; v from +y down. As in Mitsuba 3 the
+/// first and the last row of pixels are the poles, whereas the columns' centres lie at (i + 0.5) / width.
 struct EnvironmentView {
   const Rgb* pixels = nullptr;
   int width = 0, height = 0;
@@ -18,11 +19,11 @@ struct EnvironmentView {
   Affine toWorld, toLocal;    ///< rotations
   float scale = 1;
 
-  /// Radiance from direction w (away from the scene) [W/(m^2 sr)], bilinear between pixel centres.
+  /// Radiance from direction w (away from the scene) [W/(m^2 sr)], bilinear between pixels.
   VIRGA_HD Rgb radiance(Vec3 w) const {
     const Vec2 uv = toUv(toLocal.vector(w));
     const float x = uv.x * static_cast<float>(width) - 0.5f;
-    const float y = clamp(uv.y * static_cast<float>(height) - 0.5f, 0, static_cast<float>(height - 1));
+    const float y = uv.y * static_cast<float>(height - 1);
     const float fx = x - std::floor(x), fy = y - std::floor(y);
     const int x0 = (static_cast<int>(std::floor(x)) + width) % width, x1 = (x0 + 1) % width;
     const int y0 = static_cast<int>(y), y1 = y0 + 1 < height ? y0 + 1 : y0;

@@ -413,6 +413,7 @@ TEST(EnvironmentMap, LooksTheWayOthersDo) {
   EXPECT_NEAR(at({1e-3f, 1, 0}).g, 0, 1e-2f);
   EXPECT_NEAR(at({1e-3f, -1, 0}).g, 3, 1e-2f);
   EXPECT_NEAR(at({1, 0, 0}).g, 1.5f, 1e-4f);
+  EXPECT_NEAR(at({1, 1, 0}).g, 0.75f, 1e-4f) << "the first row is the pole";
   // A turn by 90 degrees about y takes what was at +x to -z.
   const Surroundings turned(image, transform("<rotate y=\"1\" angle=\"90\"/>"));
   EXPECT_NEAR(environmentRadiance(turned.emitter(), {0, 0, -1}).r, 1.5f, 1e-3f);
