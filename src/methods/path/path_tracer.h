@@ -318,7 +318,8 @@ class PathTracer {
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
     if (path.depth < options_.rrDepth) return true;
-    const float q = std::min(maxComponent(path.throughput) * path.etaScale, kMaxSurvival);
+    // A copy of the constant: std::min wants a reference, and device code has none to it.
+    const float q = std::min(maxComponent(path.throughput) * path.etaScale, float{kMaxSurvival});
     if (!(sampler.random() < q)) return false;
     path.throughput *= 1 / q;
     return true;
