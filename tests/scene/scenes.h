@@ -8,7 +8,8 @@
 
 namespace virga::test {
 
-inline constexpr const char* kSensor = "<sensor type=\"perspective\" id=\"camera\"><float name=\"fov\" value=\"40\"/></sensor>";
+inline constexpr const char* kSensor =
+    "<sensor type=\"perspective\" id=\"camera\"><float name=\"fov\" value=\"40\"/></sensor>";
 
 /// The description of a Mitsuba XML text, the elements inside <scene> alone. Relative files lie in `directory`.
 inline SceneDescription describe(const std::string& elements, const std::string& directory = ".") {

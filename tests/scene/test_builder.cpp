@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the builder makes of plugins without parameters, and what it says about bad ones, with the place.
-#include "scene/builder.h"
-
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,7 @@
 #include <limits>
 
 #include "loaders/loading.h"
+#include "scene/builder.h"
 #include "scene/scene_parts.h"
 #include "scene/scenes.h"
 #include "volume/volume_io.h"
@@ -18,14 +17,17 @@ namespace {
 
 constexpr const char* kMedium = "<medium name=\"interior\" type=\"homogeneous\"/>";
 
-std::string boundary(const std::string& inside) { return "<shape type=\"cube\"><bsdf type=\"null\"/>" + inside + "</shape>"; }
+std::string boundary(const std::string& inside) {
+  return "<shape type=\"cube\"><bsdf type=\"null\"/>" + inside + "</shape>";
+}
 std::string heterogeneous(const std::string& volume) {
   return boundary("<medium name=\"interior\" type=\"heterogeneous\">" + volume + "</medium>");
 }
 
-/// Building must fail at the mark `[[...]]` with this message, hint and note; the sensor is added where the text has none.
-void expectError(const std::string& marked, const std::string& message, const std::string& hint = "", const std::string& note = "",
-                 const std::string& directory = ".") {
+/// Building must fail at the mark `[[...]]` with this message, hint and note; the sensor is added where the text has
+/// none.
+void expectError(const std::string& marked, const std::string& message, const std::string& hint = "",
+                 const std::string& note = "", const std::string& directory = ".") {
   const bool complete = marked.find("<sensor") != std::string::npos || marked.find("[[scene]]") != std::string::npos;
   const std::string head = marked.find("[[scene]]") != std::string::npos ? "" : "<scene version=\"3.0.0\">\n";
   const loading::Marked text(head + marked + (complete ? "" : test::kSensor) + "\n</scene>");
@@ -37,7 +39,8 @@ void expectError(const std::string& marked, const std::string& message, const st
   EXPECT_EQ(error->details().position.offset, text.offset) << error->what();
   EXPECT_EQ(error->details().position.length, text.length) << error->what();
   if (!note.empty()) {
-    EXPECT_EQ(loading::errorOf([&] { throw *error; })->details().notes, std::vector<std::string>{note}) << error->what();
+    EXPECT_EQ(loading::errorOf([&] { throw *error; })->details().notes, std::vector<std::string>{note})
+        << error->what();
   }
 }
 
@@ -65,8 +68,8 @@ TEST(Builder, EveryPluginHasDefaults) {
     EXPECT_EQ(scene->view.boundaries.size, 1);
   }
   for (const char* phase : {"isotropic", "hg", "cornette_shanks"})
-    EXPECT_NO_THROW(test::build(boundary(
-        fmt::format("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"{}\"/></medium>", phase))));
+    EXPECT_NO_THROW(test::build(
+        boundary(fmt::format("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"{}\"/></medium>", phase))));
   const SceneSnapshot scene = test::build("<integrator type=\"volpath\"/>");
   EXPECT_EQ(scene->camera.filmWidth, 768);
   EXPECT_EQ(scene->camera.filmHeight, 576);
@@ -83,11 +86,13 @@ TEST(Builder, UnknownPluginsAreNamedWithWhatIsThere) {
   expectError("<shape type=\"[[spere]]\"/>", "unknown shape type \"spere\"", "did you mean \"sphere\"?",
               "available: cube, disk, obj, ply, rectangle, sphere");
   expectError("<emitter type=\"[[spott]]\"/>", "unknown emitter type \"spott\"", "did you mean \"spot\"?");
-  expectError("<shape type=\"cube\"><bsdf type=\"[[defuse]]\"/></shape>", "unknown bsdf type \"defuse\"", "did you mean \"diffuse\"?");
+  expectError("<shape type=\"cube\"><bsdf type=\"[[defuse]]\"/></shape>", "unknown bsdf type \"defuse\"",
+              "did you mean \"diffuse\"?");
   expectError("<integrator type=\"[[volpth]]\"/>", "unknown integrator type \"volpth\"", "did you mean \"volpath\"?");
   expectError(heterogeneous("<volume name=\"sigma_t\" type=\"[[gridvolum]]\"/>"), "unknown volume type \"gridvolum\"",
               "did you mean \"gridvolume\"?");
-  expectError("<sensor type=\"[[perspektive]]\"/>", "unknown sensor type \"perspektive\"", "did you mean \"perspective\"?");
+  expectError("<sensor type=\"[[perspektive]]\"/>", "unknown sensor type \"perspektive\"",
+              "did you mean \"perspective\"?");
 }
 
 TEST(Builder, PluginsOfTheFutureAreNotUnknown) {
@@ -95,38 +100,49 @@ TEST(Builder, PluginsOfTheFutureAreNotUnknown) {
               "available: cube, disk, obj, ply, rectangle, sphere");
   expectError("<sensor type=\"[[thinlens]]\"/>", "sensor type \"thinlens\" is not supported yet");
   expectError("<emitter type=\"[[projector]]\"/>", "emitter type \"projector\" is not supported yet");
-  expectError("<shape type=\"cube\"><bsdf type=\"[[roughconductor]]\"/></shape>", "bsdf type \"roughconductor\" is not supported yet");
-  expectError("<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\"><rfilter type=\"[[lanczos]]\"/>"
-              "</film></sensor>", "rfilter type \"lanczos\" is not supported yet");
+  expectError("<shape type=\"cube\"><bsdf type=\"[[roughconductor]]\"/></shape>",
+              "bsdf type \"roughconductor\" is not supported yet");
+  expectError(
+      "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\"><rfilter "
+      "type=\"[[lanczos]]\"/>"
+      "</film></sensor>",
+      "rfilter type \"lanczos\" is not supported yet");
   expectError(boundary("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"[[rayleigh]]\"/></medium>"),
               "phase type \"rayleigh\" is not supported yet");
-  expectError("<shape type=\"cube\"><bsdf type=\"diffuse\"><[[texture]] name=\"reflectance\" type=\"bitmap\"/></bsdf></shape>",
-              "textures (\"bitmap\") are not supported yet", "give an rgb value");
+  expectError(
+      "<shape type=\"cube\"><bsdf type=\"diffuse\"><[[texture]] name=\"reflectance\" type=\"bitmap\"/></bsdf></shape>",
+      "textures (\"bitmap\") are not supported yet", "give an rgb value");
 }
 
 TEST(Builder, UnknownParametersAreNamedWithWhatIsThere) {
-  expectError("<shape type=\"sphere\"><float name=\"[[radios]]\" value=\"1\"/></shape>", "unknown parameter \"radios\" of shape \"sphere\"",
-              "did you mean \"radius\"?");
-  expectError(boundary("<medium name=\"interior\" type=\"homogeneous\"><float name=\"[[sigmat]]\" value=\"1\"/></medium>"),
-              "unknown parameter \"sigmat\" of medium \"homogeneous\"", "did you mean \"sigma_t\"?");
+  expectError("<shape type=\"sphere\"><float name=\"[[radios]]\" value=\"1\"/></shape>",
+              "unknown parameter \"radios\" of shape \"sphere\"", "did you mean \"radius\"?");
+  expectError(
+      boundary("<medium name=\"interior\" type=\"homogeneous\"><float name=\"[[sigmat]]\" value=\"1\"/></medium>"),
+      "unknown parameter \"sigmat\" of medium \"homogeneous\"", "did you mean \"sigma_t\"?");
   expectError("<emitter type=\"point\"><float name=\"[[radiance]]\" value=\"1\"/></emitter>",
               "unknown parameter \"radiance\" of emitter \"point\"", "");
 }
 
 TEST(Builder, LenientTurnsUnknownParametersIntoWarnings) {
-  const SceneDescription d = test::describe(
-      std::string("<shape type=\"sphere\"><float name=\"radios\" value=\"1\"/><string name=\"colour\" value=\"red\"/></shape>") + test::kSensor);
+  const SceneDescription d =
+      test::describe(std::string("<shape type=\"sphere\"><float name=\"radios\" value=\"1\"/><string name=\"colour\" "
+                                 "value=\"red\"/></shape>") +
+                     test::kSensor);
   const SceneSnapshot scene = buildScene(d, {.filmSize = {}, .lenient = true});
   ASSERT_EQ(scene->warnings.size(), 2u);
   EXPECT_EQ(scene->warnings[0].substr(0, scene->warnings[0].find('\n')),
             "test.xml:2:35: warning: unknown parameter \"radios\" of shape \"sphere\"");
   EXPECT_THROW(buildScene(d), Error);
-  const SceneDescription bad = test::describe(std::string("<shape type=\"sphere\"><float name=\"radius\" value=\"-1\"/></shape>") + test::kSensor);
+  const SceneDescription bad = test::describe(
+      std::string("<shape type=\"sphere\"><float name=\"radius\" value=\"-1\"/></shape>") + test::kSensor);
   EXPECT_THROW(buildScene(bad, {.filmSize = {}, .lenient = true}), Error) << "lenience does not make up for bad values";
 }
 
 TEST(Builder, ValuesOutOfRange) {
-  const auto inMedium = [](const std::string& p) { return boundary("<medium name=\"interior\" type=\"homogeneous\">" + p + "</medium>"); };
+  const auto inMedium = [](const std::string& p) {
+    return boundary("<medium name=\"interior\" type=\"homogeneous\">" + p + "</medium>");
+  };
   expectError(inMedium("<float name=\"albedo\" value=\"[[1.01]]\"/>"), "\"albedo\" is 1.01; it must be in [0, 1]");
   expectError(inMedium("<rgb name=\"albedo\" value=\"[[0.5, 2, 0.5]]\"/>"), "\"albedo\" is 2; it must be in [0, 1]");
   expectError(inMedium("<float name=\"sigma_t\" value=\"[[-1]]\"/>"), "\"sigma_t\" is -1; it must be at least 0");
@@ -135,32 +151,42 @@ TEST(Builder, ValuesOutOfRange) {
   for (const char* g : {"1", "-1", "1.5"})
     expectError(inMedium(fmt::format("<phase type=\"hg\"><float name=\"g\" value=\"[[{}]]\"/></phase>", g)),
                 fmt::format("\"g\" is {}; it must be in (-1, 1)", g));
-  expectError("<shape type=\"cube\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"[[1.5]]\"/></bsdf></shape>",
-              "\"reflectance\" is 1.5; it must be in [0, 1]");
-  expectError("<shape type=\"sphere\"><float name=\"radius\" value=\"[[0]]\"/></shape>", "\"radius\" is 0; it must be greater than 0");
+  expectError(
+      "<shape type=\"cube\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"[[1.5]]\"/></bsdf></shape>",
+      "\"reflectance\" is 1.5; it must be in [0, 1]");
+  expectError("<shape type=\"sphere\"><float name=\"radius\" value=\"[[0]]\"/></shape>",
+              "\"radius\" is 0; it must be greater than 0");
   expectError("<shape type=\"sphere\"><float name=\"radius\" value=\"[[1e40]]\"/></shape>", "\"radius\" is too large");
-  expectError("<shape type=\"sphere\"><string name=\"radius\" value=\"[[wide]]\"/></shape>", "\"radius\" must be a float, not a string");
-  expectError("<emitter type=\"directional\"><[[vector]] name=\"direction\" x=\"0\" y=\"0\" z=\"0\"/></emitter>", "\"direction\" has no length");
+  expectError("<shape type=\"sphere\"><string name=\"radius\" value=\"[[wide]]\"/></shape>",
+              "\"radius\" must be a float, not a string");
+  expectError("<emitter type=\"directional\"><[[vector]] name=\"direction\" x=\"0\" y=\"0\" z=\"0\"/></emitter>",
+              "\"direction\" has no length");
 }
 
 TEST(Builder, Films) {
   const auto film = [](const std::string& p) {
-    return "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">" + p + "</film></sensor>";
+    return "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">" + p +
+           "</film></sensor>";
   };
   expectError(film("<integer name=\"width\" value=\"[[0]]\"/>"), "\"width\" is 0; it must be in [1, 65536]");
   expectError(film("<integer name=\"height\" value=\"[[-5]]\"/>"), "\"height\" is -5; it must be in [1, 65536]");
   expectError(film("<integer name=\"width\" value=\"100\"/><integer name=\"crop_width\" value=\"[[101]]\"/>"),
               "the crop window leaves the film, which is 100 pixels wide");
-  expectError("<sensor type=\"[[perspective]]\"><film type=\"hdrfilm\"/></sensor>", "a perspective sensor needs \"fov\" or \"focal_length\"");
-  expectError("<sensor type=\"perspective\"><float name=\"fov\" value=\"[[180]]\"/></sensor>", "\"fov\" is 180; it must be in (0, 180)");
-  expectError("<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><float name=\"near_clip\" value=\"5\"/>"
-              "<float name=\"far_clip\" value=\"[[2]]\"/></sensor>", "\"far_clip\" must be greater than \"near_clip\"");
+  expectError("<sensor type=\"[[perspective]]\"><film type=\"hdrfilm\"/></sensor>",
+              "a perspective sensor needs \"fov\" or \"focal_length\"");
+  expectError("<sensor type=\"perspective\"><float name=\"fov\" value=\"[[180]]\"/></sensor>",
+              "\"fov\" is 180; it must be in (0, 180)");
+  expectError(
+      "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><float name=\"near_clip\" value=\"5\"/>"
+      "<float name=\"far_clip\" value=\"[[2]]\"/></sensor>",
+      "\"far_clip\" must be greater than \"near_clip\"");
 }
 
 TEST(Builder, OneSensorNoLess) {
   expectError("<[[scene]] version=\"3.0.0\">", "the scene has no sensor", "add a <sensor type=\"perspective\">");
-  expectError(std::string(test::kSensor) + "\n<[[sensor]] type=\"perspective\"><float name=\"fov\" value=\"20\"/></sensor>",
-              "the scene has 2 sensors", "keep one of them");
+  expectError(
+      std::string(test::kSensor) + "\n<[[sensor]] type=\"perspective\"><float name=\"fov\" value=\"20\"/></sensor>",
+      "the scene has 2 sensors", "keep one of them");
 }
 
 TEST(Builder, Transforms) {
@@ -168,21 +194,24 @@ TEST(Builder, Transforms) {
     return fmt::format("<shape type=\"{}\">{}</shape>", shape, t);
   };
   for (const char* shape : {"cube", "sphere", "rectangle", "disk"}) {
-    const SceneDescription d = test::describe(placed(shape, "<transform name=\"to_world\"><scale x=\"1\" y=\"0\" z=\"1\"/></transform>") + test::kSensor);
+    const SceneDescription d = test::describe(
+        placed(shape, "<transform name=\"to_world\"><scale x=\"1\" y=\"0\" z=\"1\"/></transform>") + test::kSensor);
     const auto error = loading::errorOf([&] { buildScene(d); });
     ASSERT_TRUE(error) << shape;
     EXPECT_EQ(error->message(), "the transform \"to_world\" is singular: it flattens space");
     EXPECT_EQ(error->details().position.line(), 2);
   }
-  const SceneDescription uneven = test::describe(placed("sphere", "<transform name=\"to_world\"><scale x=\"1\" y=\"2\" z=\"1\"/></transform>") + test::kSensor);
+  const SceneDescription uneven = test::describe(
+      placed("sphere", "<transform name=\"to_world\"><scale x=\"1\" y=\"2\" z=\"1\"/></transform>") + test::kSensor);
   const auto error = loading::errorOf([&] { buildScene(uneven); });
   ASSERT_TRUE(error);
   EXPECT_EQ(error->message(), "a sphere's transform must scale evenly and not shear");
   EXPECT_EQ(error->details().hint, "use a mesh for an ellipsoid or ellipse");
   // The loader refuses a camera that looks along its own up.
   const auto up = loading::errorOf([] {
-    test::describe("<sensor type=\"perspective\"><transform name=\"to_world\"><lookat origin=\"0, 0, 0\" target=\"0, 5, 0\" "
-                   "up=\"0, 1, 0\"/></transform></sensor>");
+    test::describe(
+        "<sensor type=\"perspective\"><transform name=\"to_world\"><lookat origin=\"0, 0, 0\" target=\"0, 5, 0\" "
+        "up=\"0, 1, 0\"/></transform></sensor>");
   });
   ASSERT_TRUE(up);
   EXPECT_EQ(up->message(), "\"up\" must not be zero or point along the line of sight");
@@ -198,11 +227,13 @@ TEST(Builder, Emitters) {
 
 TEST(Builder, MissingFilesAreLookedForInFoldersThatAreNamed) {
   const loading::TemporaryFolder folder;
-  expectError("<shape type=\"obj\"><string name=\"filename\" value=\"[[bunny.obj]]\"/></shape>", "file \"bunny.obj\" not found", "",
-              "looked in " + folder.path().string(), folder.path().string());
-  expectError("<shape type=\"ply\"><string name=\"filename\" value=\"[[/no/such.ply]]\"/></shape>", "file \"/no/such.ply\" not found");
+  expectError("<shape type=\"obj\"><string name=\"filename\" value=\"[[bunny.obj]]\"/></shape>",
+              "file \"bunny.obj\" not found", "", "looked in " + folder.path().string(), folder.path().string());
+  expectError("<shape type=\"ply\"><string name=\"filename\" value=\"[[/no/such.ply]]\"/></shape>",
+              "file \"/no/such.ply\" not found");
   expectError("<shape type=\"[[obj]]\"/>", "\"filename\" is missing");
-  expectError("<emitter type=\"envmap\"><string name=\"filename\" value=\"[[sky.exr]]\"/></emitter>", "file \"sky.exr\" not found");
+  expectError("<emitter type=\"envmap\"><string name=\"filename\" value=\"[[sky.exr]]\"/></emitter>",
+              "file \"sky.exr\" not found");
 }
 
 DenseVolume smallVolume() {
@@ -214,7 +245,8 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
   const loading::TemporaryFolder folder;
   writeVdb(folder.path() / "smoke.vdb", smallVolume());
   const auto volume = [](const std::string& file, const std::string& more) {
-    return heterogeneous(fmt::format("<volume name=\"sigma_t\" type=\"vdb\"><string name=\"filename\" value=\"{}\"/>{}</volume>", file, more));
+    return heterogeneous(fmt::format(
+        "<volume name=\"sigma_t\" type=\"vdb\"><string name=\"filename\" value=\"{}\"/>{}</volume>", file, more));
   };
   const auto failure = [&](const std::string& elements) {
     const auto error = loading::errorOf([&] { test::build(elements, folder.path().string()); });
@@ -229,8 +261,8 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
   DenseVolume nan = smallVolume();
   nan.values[5] = std::numeric_limits<float>::quiet_NaN();
   writeVol(folder.path() / "nan.vol", nan);
-  const std::string broken = failure(
-      heterogeneous("<volume name=\"sigma_t\" type=\"gridvolume\">\n<string name=\"filename\" value=\"nan.vol\"/></volume>"));
+  const std::string broken = failure(heterogeneous(
+      "<volume name=\"sigma_t\" type=\"gridvolume\">\n<string name=\"filename\" value=\"nan.vol\"/></volume>"));
   EXPECT_TRUE(broken.starts_with("test.xml:3:32: error: ")) << broken;
   EXPECT_NE(broken.find("NaN"), std::string::npos) << broken;
   EXPECT_NE(broken.find("(1, 0, 1)"), std::string::npos) << "where: " << broken;
@@ -244,23 +276,30 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
 
   DenseVolume bright = smallVolume();
   writeVol(folder.path() / "bright.vol", bright);
-  EXPECT_NE(failure(heterogeneous("<volume name=\"albedo\" type=\"gridvolume\"><string name=\"filename\" value=\"bright.vol\"/></volume>"))
-                .find("error: albedo reaches 7; it must be at most 1"),
-            std::string::npos);
+  EXPECT_NE(
+      failure(
+          heterogeneous(
+              "<volume name=\"albedo\" type=\"gridvolume\"><string name=\"filename\" value=\"bright.vol\"/></volume>"))
+          .find("error: albedo reaches 7; it must be at most 1"),
+      std::string::npos);
 }
 
 TEST(Builder, ManyOverlappingVolumesAreWarnedOf) {
   const auto boxes = [](int count, float step) {
     std::string text;
     for (int i = 0; i < count; ++i)
-      text += fmt::format("<shape type=\"cube\"><bsdf type=\"null\"/>{}<transform name=\"to_world\"><translate x=\"{}\" y=\"{}\" z=\"0\"/>"
-                          "</transform></shape>", kMedium, step * static_cast<float>(i), 0.1 * i);
+      text += fmt::format(
+          "<shape type=\"cube\"><bsdf type=\"null\"/>{}<transform name=\"to_world\"><translate x=\"{}\" y=\"{}\" "
+          "z=\"0\"/>"
+          "</transform></shape>",
+          kMedium, step * static_cast<float>(i), 0.1 * i);
     return text;
   };
   EXPECT_TRUE(test::build(boxes(8, 0.1f))->warnings.empty());
   const SceneSnapshot crowded = test::build(boxes(12, 0.1f));
   ASSERT_EQ(crowded->warnings.size(), 1u);
-  EXPECT_EQ(crowded->warnings[0], "warning: more than 8 volumes may overlap; where more than 8 do, the others are left out");
+  EXPECT_EQ(crowded->warnings[0],
+            "warning: more than 8 volumes may overlap; where more than 8 do, the others are left out");
   EXPECT_TRUE(test::build(boxes(200, 2))->warnings.empty()) << "a row of volumes that touch";
 }
 
@@ -328,7 +367,8 @@ TEST(Sharing, AChangedFileIsReadAgain) {
   DenseVolume other = smallVolume();
   other.values[0] = 99;
   writeVdb(shared.folder.path() / "smoke.vdb", other);
-  std::filesystem::last_write_time(shared.folder.path() / "smoke.vdb", std::filesystem::file_time_type::clock::now() + std::chrono::seconds(5));
+  std::filesystem::last_write_time(shared.folder.path() / "smoke.vdb",
+                                   std::filesystem::file_time_type::clock::now() + std::chrono::seconds(5));
   const SceneSnapshot next = buildScene(shared.description, {}, shared.scene);
   EXPECT_EQ(next->parts->cache.grids.begin()->second->maximum(), 99);
   EXPECT_EQ(shared.scene->parts->cache.grids.begin()->second->maximum(), 7);
@@ -365,7 +405,8 @@ TEST(Differences, HaveTheRightAspects) {
 
 TEST(Differences, OfTheSetOfEmitters) {
   const Shared shared;
-  const SceneDescription more = test::describe(std::string(kShared) + "<emitter type=\"point\" id=\"second\"/>", shared.folder.path().string());
+  const SceneDescription more =
+      test::describe(std::string(kShared) + "<emitter type=\"point\" id=\"second\"/>", shared.folder.path().string());
   const ChangeSet set = differences(shared.description, more);
   ASSERT_EQ(set.changes.size(), 1u);
   EXPECT_EQ(set.changes[0], (Change{"second", Aspect::emitterSet}));
@@ -376,17 +417,23 @@ TEST(Differences, OfTheSetOfEmitters) {
 // --- Where the camera is
 
 TEST(CameraMedia, AreThoseOfTheVolumesAroundIt) {
-  const std::string cubes = boundary(kMedium) + "<shape type=\"cube\"><bsdf type=\"null\"/><transform name=\"to_world\"><translate x=\"5\"/>"
-                            "</transform><medium name=\"interior\" type=\"homogeneous\"><float name=\"sigma_t\" value=\"2\"/></medium></shape>";
+  const std::string cubes =
+      boundary(kMedium) +
+      "<shape type=\"cube\"><bsdf type=\"null\"/><transform name=\"to_world\"><translate x=\"5\"/>"
+      "</transform><medium name=\"interior\" type=\"homogeneous\"><float name=\"sigma_t\" "
+      "value=\"2\"/></medium></shape>";
   const auto at = [&](double x, const std::string& medium = "") {
-    return buildScene(test::describe(cubes + fmt::format("<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>{}"
-                                     "<transform name=\"to_world\"><translate x=\"{}\"/></transform></sensor>", medium, x)));
+    return buildScene(
+        test::describe(cubes + fmt::format("<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/>{}"
+                                           "<transform name=\"to_world\"><translate x=\"{}\"/></transform></sensor>",
+                                           medium, x)));
   };
   EXPECT_EQ(at(0)->view.cameraMedia.count(), 1);
   EXPECT_EQ(at(0)->view.media[at(0)->view.cameraMedia.medium(0)].sigmaT, 1);
   EXPECT_EQ(at(5)->view.media[at(5)->view.cameraMedia.medium(0)].sigmaT, 2);
   EXPECT_TRUE(at(2.5)->view.cameraMedia.vacuum());
-  EXPECT_EQ(at(0, "<medium type=\"homogeneous\"/>")->view.cameraMedia.count(), 1) << "the same medium, declared twice, counts once";
+  EXPECT_EQ(at(0, "<medium type=\"homogeneous\"/>")->view.cameraMedia.count(), 1)
+      << "the same medium, declared twice, counts once";
   EXPECT_EQ(at(2.5, "<medium type=\"homogeneous\"/>")->view.cameraMedia.count(), 1);
 }
 
@@ -401,7 +448,8 @@ TEST(CameraMedia, StopAtSurfaces) {
       <transform name="to_world"><translate x="{0}" y="{0}" z="{0}"/></transform></sensor>)";
   const auto sigmaAt = [&](double x) {
     std::string text = scene;
-    for (size_t i = text.find("{0}"); i != std::string::npos; i = text.find("{0}")) text.replace(i, 3, fmt::format("{}", x));
+    for (size_t i = text.find("{0}"); i != std::string::npos; i = text.find("{0}"))
+      text.replace(i, 3, fmt::format("{}", x));
     const SceneSnapshot built = buildScene(test::describe(text));
     const MediaState& media = built->view.cameraMedia;
     return media.vacuum() ? 0.f : built->view.media[media.medium(0)].sigmaT;

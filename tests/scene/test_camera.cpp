@@ -11,13 +11,18 @@ namespace virga {
 namespace {
 
 std::string sensor(const std::string& inside, const std::string& film = "", const std::string& filter = "") {
-  return fmt::format("<sensor type=\"perspective\">{}<film type=\"hdrfilm\">{}{}</film></sensor>", inside, film, filter);
+  return fmt::format("<sensor type=\"perspective\">{}<film type=\"hdrfilm\">{}{}</film></sensor>", inside, film,
+                     filter);
 }
 
 SceneSnapshot seenBy(const std::string& sensorText) { return buildScene(test::describe(sensorText)); }
 
-std::string number(const char* name, double value) { return fmt::format("<float name=\"{}\" value=\"{}\"/>", name, value); }
-std::string whole(const char* name, int value) { return fmt::format("<integer name=\"{}\" value=\"{}\"/>", name, value); }
+std::string number(const char* name, double value) {
+  return fmt::format("<float name=\"{}\" value=\"{}\"/>", name, value);
+}
+std::string whole(const char* name, int value) {
+  return fmt::format("<integer name=\"{}\" value=\"{}\"/>", name, value);
+}
 
 void expectNear(Vec3 a, Vec3 b, float tolerance) {
   EXPECT_NEAR(a.x, b.x, tolerance);
@@ -34,18 +39,21 @@ TEST(Camera, RaysAreThoseOfAnIndependentRenderer) {
   };
   const Vec3 ox(0.85983962f, 1.86753845f, 2.53627777f), dx(-0.27907932f, -0.26374984f, -0.92333686f);
   const Vec3 oy(0.84673971f, 1.88677812f, 2.53233790f), dy(-0.30349126f, -0.22420585f, -0.92608035f);
-  const Expected all[] = {{"x", ox, dx, 19.586744f},
-                          {"y", oy, dy, 19.694639f},
-                          {"diagonal", {0.86423987f, 1.86107588f, 2.53760123f}, {-0.27068606f, -0.27699467f, -0.92195612f}, 19.560094f},
-                          {"smaller", oy, dy, 19.694639f},
-                          {"larger", ox, dx, 19.586744f}};
+  const Expected all[] = {
+      {"x", ox, dx, 19.586744f},
+      {"y", oy, dy, 19.694639f},
+      {"diagonal", {0.86423987f, 1.86107588f, 2.53760123f}, {-0.27068606f, -0.27699467f, -0.92195612f}, 19.560094f},
+      {"smaller", oy, dy, 19.694639f},
+      {"larger", ox, dx, 19.586744f}};
   for (const Expected& e : all) {
-    const SceneSnapshot scene = seenBy(
-        sensor(number("fov", 40) + fmt::format("<string name=\"fov_axis\" value=\"{}\"/>", e.axis) + number("near_clip", 0.5) +
-                   number("far_clip", 20) + number("principal_point_offset_x", 0.1) + number("principal_point_offset_y", -0.05) +
-                   "<transform name=\"to_world\"><lookat origin=\"1, 2, 3\" target=\"0, 0.5, -1\" up=\"0, 1, 0\"/></transform>",
-               whole("width", 120) + whole("height", 80) + whole("crop_offset_x", 30) + whole("crop_offset_y", 10) +
-                   whole("crop_width", 40) + whole("crop_height", 50)));
+    const SceneSnapshot scene =
+        seenBy(sensor(number("fov", 40) + fmt::format("<string name=\"fov_axis\" value=\"{}\"/>", e.axis) +
+                          number("near_clip", 0.5) + number("far_clip", 20) + number("principal_point_offset_x", 0.1) +
+                          number("principal_point_offset_y", -0.05) +
+                          "<transform name=\"to_world\"><lookat origin=\"1, 2, 3\" target=\"0, 0.5, -1\" up=\"0, 1, "
+                          "0\"/></transform>",
+                      whole("width", 120) + whole("height", 80) + whole("crop_offset_x", 30) +
+                          whole("crop_offset_y", 10) + whole("crop_width", 40) + whole("crop_height", 50)));
     const CameraRay r = scene->camera.ray(10.25f, 20.5f);
     SCOPED_TRACE(e.axis);
     expectNear(r.ray.o, e.o, 2e-6f);
@@ -70,8 +78,9 @@ TEST(Camera, CornersByHand) {
 
 TEST(Camera, PortraitFilms) {
   const auto tangents = [](const char* axis) {
-    const SceneSnapshot scene = seenBy(sensor(number("fov", 90) + fmt::format("<string name=\"fov_axis\" value=\"{}\"/>", axis),
-                                              whole("width", 100) + whole("height", 200)));
+    const SceneSnapshot scene =
+        seenBy(sensor(number("fov", 90) + fmt::format("<string name=\"fov_axis\" value=\"{}\"/>", axis),
+                      whole("width", 100) + whole("height", 200)));
     return Vec2{scene->camera.tanX, scene->camera.tanY};
   };
   EXPECT_NEAR(tangents("smaller").x, 1, 1e-6);
@@ -81,21 +90,23 @@ TEST(Camera, PortraitFilms) {
 }
 
 TEST(Camera, FocalLengthIsThatOf35mmFilm) {
-  const SceneSnapshot scene = seenBy(
-      sensor("<string name=\"focal_length\" value=\"50mm\"/>", whole("width", 300) + whole("height", 200)));
+  const SceneSnapshot scene =
+      seenBy(sensor("<string name=\"focal_length\" value=\"50mm\"/>", whole("width", 300) + whole("height", 200)));
   EXPECT_NEAR(scene->camera.tanX, 36.0 / 100, 1e-5);
   EXPECT_NEAR(scene->camera.tanY, 24.0 / 100, 1e-5);
 }
 
 TEST(Camera, ScaleInItsTransformChangesNothing) {
   const SceneSnapshot plain = seenBy(sensor(number("fov", 50)));
-  const SceneSnapshot scaled = seenBy(sensor(number("fov", 50) + "<transform name=\"to_world\"><scale value=\"3\"/></transform>"));
+  const SceneSnapshot scaled =
+      seenBy(sensor(number("fov", 50) + "<transform name=\"to_world\"><scale value=\"3\"/></transform>"));
   expectNear(plain->camera.ray(10, 20).ray.o, scaled->camera.ray(10, 20).ray.o, 1e-7f);
   expectNear(plain->camera.ray(10, 20).ray.d, scaled->camera.ray(10, 20).ray.d, 1e-6f);
 }
 
 TEST(Camera, AnotherFilmSizeDropsTheCropWindow) {
-  const SceneDescription d = test::describe(sensor(number("fov", 90), whole("width", 100) + whole("height", 100) + whole("crop_offset_x", 50)));
+  const SceneDescription d = test::describe(
+      sensor(number("fov", 90), whole("width", 100) + whole("height", 100) + whole("crop_offset_x", 50)));
   EXPECT_EQ(buildScene(d)->camera.width, 50);
   const SceneSnapshot scene = buildScene(d, {.filmSize = std::pair(64, 32)});
   EXPECT_EQ(scene->camera.width, 64);
@@ -108,9 +119,12 @@ PixelFilter filterOf(const std::string& text) { return seenBy(sensor(number("fov
 
 double filterP(const PixelFilter& filter, double radius, const std::function<double(double)>& weight) {
   const double total = stats::integrateInterval(weight, -radius, radius);
-  return stats::chiSquaredInterval({.cells = 100, .lo = -radius, .hi = radius, .samples = 400'000},
-                                   [&](float u) -> std::optional<double> { return static_cast<double>(filter.sample({u, 0.5f}).x); },
-                                   [&](double x) { return std::fabs(x) < radius ? weight(x) / total : 0.0; });
+  return stats::chiSquaredInterval(
+      {.cells = 100, .lo = -radius, .hi = radius, .samples = 400'000},
+      [&](float u) -> std::optional<double> {
+        return static_cast<double>(filter.sample({u, 0.5f}).x);
+      },
+      [&](double x) { return std::fabs(x) < radius ? weight(x) / total : 0.0; });
 }
 
 TEST(PixelFilter, SamplesFollowTheFilter) {

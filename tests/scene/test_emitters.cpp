@@ -17,8 +17,9 @@ namespace {
 constexpr double kPiDouble = 3.14159265358979324;
 
 std::string areaLight(const std::string& shape, const std::string& inside) {
-  return fmt::format("<shape type=\"{}\">{}<emitter type=\"area\"><rgb name=\"radiance\" value=\"2, 3, 4\"/></emitter></shape>",
-                     shape, inside);
+  return fmt::format(
+      "<shape type=\"{}\">{}<emitter type=\"area\"><rgb name=\"radiance\" value=\"2, 3, 4\"/></emitter></shape>", shape,
+      inside);
 }
 
 std::string transform(const std::string& steps) { return "<transform name=\"to_world\">" + steps + "</transform>"; }
@@ -29,16 +30,15 @@ struct Case {
   std::vector<Vec3> receivers;
 };
 
-std::string matrix(const Matrix4& m) {
-  return transform(fmt::format("<matrix value=\"{}\"/>", fmt::join(m.m, " ")));
-}
+std::string matrix(const Matrix4& m) { return transform(fmt::format("<matrix value=\"{}\"/>", fmt::join(m.m, " "))); }
 
 Matrix4 skewed() { return Matrix4::rotation(0, 1, 0, 30) * Matrix4::scaling(0.5, 1.5, 1); }
 Matrix4 turned() { return Matrix4::rotation(1, 2, 0.3, 40) * Matrix4::scaling(0.7, 0.7, 0.7); }
 
 constexpr float kRadius = 0.5f;
 constexpr Vec3 kCenter(0.2f, 0, 0);
-constexpr const char* kSphere = "<float name=\"radius\" value=\"0.5\"/><point name=\"center\" x=\"0.2\" y=\"0\" z=\"0\"/>";
+constexpr const char* kSphere =
+    "<float name=\"radius\" value=\"0.5\"/><point name=\"center\" x=\"0.2\" y=\"0\" z=\"0\"/>";
 constexpr const char* kInward = "<boolean name=\"flip_normals\" value=\"true\"/>";
 
 std::vector<Case> areaLights() {
@@ -47,7 +47,8 @@ std::vector<Case> areaLights() {
           {"disk", areaLight("disk", matrix(turned())), around},
           {"cube", areaLight("cube", matrix(turned())), {{0, 0, 3}, {1, -2, 1.5f}, {-40, 10, 70}}},
           {"sphere", areaLight("sphere", kSphere), {{0, 0, 3}, {0.2f, 0.1f, 0.55f}, {0.2f, 0, 0.5001f}, {30, 20, -70}}},
-          {"sphere, from within", areaLight("sphere", std::string(kSphere) + kInward),
+          {"sphere, from within",
+           areaLight("sphere", std::string(kSphere) + kInward),
            {{0.2f, 0, 0}, {0.3f, 0.1f, -0.2f}, {0.2f, 0.499f, 0}}}};
 }
 
@@ -120,35 +121,56 @@ void expectFollows(const Case& c, const std::function<Chart(const Scene&, Vec3)>
 TEST(AreaLight, DirectionsFollowTheDensity) {
   const std::vector<Case> cases = areaLights();
   const Affine rectangle(skewed()), toRectangle(skewed().inverse()), disk(turned()), toDisk(turned().inverse());
-  expectFollows(cases[0], [&](const Scene& scene, Vec3 x) {
-    return chartOf(scene, x, [=](Vec2 u) { return rectangle.point({2 * u.x - 1, 2 * u.y - 1, 0}); },
-                   [=](Vec3 p) { return Vec2{0.5f + 0.5f * toRectangle.point(p).x, 0.5f + 0.5f * toRectangle.point(p).y}; });
-  }, true);
-  expectFollows(cases[1], [&](const Scene& scene, Vec3 x) {
-    return chartOf(scene, x,
-                   [=](Vec2 u) { return disk.point(sphericalDirection(std::sqrt(u.x), 0, kTwoPi * u.y)); },
-                   [=](Vec3 p) {
-                     const Vec3 q = toDisk.point(p);
-                     return Vec2{q.x * q.x + q.y * q.y, turn(q.y, q.x)};
-                   });
-  }, true);
-  expectFollows(cases[3], [&](const Scene&, Vec3 x) {
-    const Frame frame(normalize(kCenter - x));
-    const float height = coneHeight(kRadius, distance(x, kCenter));
-    return Chart{[=](Vec2 u) { return frame.toWorld(uniformCone({u.x, u.y}, height)); },
-                 [=](Vec3 w) {
-                   const Vec3 v = frame.toLocal(w);
-                   return Vec2{(1 - v.z) / height, turn(v.y, v.x)};
-                 },
-                 [=](Vec3) { return kTwoPi * height; }};
-  }, false);
-  expectFollows(cases[4], [&](const Scene& scene, Vec3 x) {
-    return chartOf(scene, x, [=](Vec2 u) { return kCenter + uniformSphere(u) * kRadius; },
-                   [=](Vec3 p) {
-                     const Vec3 n = (p - kCenter) / kRadius;
-                     return Vec2{0.5f * (1 - n.z), turn(n.y, n.x)};
-                   });
-  }, true);
+  expectFollows(
+      cases[0],
+      [&](const Scene& scene, Vec3 x) {
+        return chartOf(
+            scene, x,
+            [=](Vec2 u) {
+              return rectangle.point({2 * u.x - 1, 2 * u.y - 1, 0});
+            },
+            [=](Vec3 p) {
+              return Vec2{0.5f + 0.5f * toRectangle.point(p).x, 0.5f + 0.5f * toRectangle.point(p).y};
+            });
+      },
+      true);
+  expectFollows(
+      cases[1],
+      [&](const Scene& scene, Vec3 x) {
+        return chartOf(
+            scene, x, [=](Vec2 u) { return disk.point(sphericalDirection(std::sqrt(u.x), 0, kTwoPi * u.y)); },
+            [=](Vec3 p) {
+              const Vec3 q = toDisk.point(p);
+              return Vec2{q.x * q.x + q.y * q.y, turn(q.y, q.x)};
+            });
+      },
+      true);
+  expectFollows(
+      cases[3],
+      [&](const Scene&, Vec3 x) {
+        const Frame frame(normalize(kCenter - x));
+        const float height = coneHeight(kRadius, distance(x, kCenter));
+        return Chart{[=](Vec2 u) {
+                       return frame.toWorld(uniformCone({u.x, u.y}, height));
+                     },
+                     [=](Vec3 w) {
+                       const Vec3 v = frame.toLocal(w);
+                       return Vec2{(1 - v.z) / height, turn(v.y, v.x)};
+                     },
+                     [=](Vec3) { return kTwoPi * height; }};
+      },
+      false);
+  expectFollows(
+      cases[4],
+      [&](const Scene& scene, Vec3 x) {
+        return chartOf(
+            scene, x, [=](Vec2 u) { return kCenter + uniformSphere(u) * kRadius; },
+            [=](Vec3 p) {
+              const Vec3 n = (p - kCenter) / kRadius;
+              return Vec2{0.5f * (1 - n.z), turn(n.y, n.x)};
+            });
+      },
+      true);
 }
 
 TEST(AreaLight, ReportsTheDensityThatItsPdfFunctionsGive) {
@@ -226,12 +248,14 @@ TEST(AreaLight, GivesTheKnownIrradiance) {
   }
   const SceneSnapshot disk = test::build(areaLight("disk", ""));
   for (const double d : {0.3, 1.0, 30.0})
-    expectIrradiance(*disk, {0, 0, static_cast<float>(d)}, {0, 0, -1}, 2 * kPiDouble / (1 + d * d), fmt::format("disk from {}", d));
+    expectIrradiance(*disk, {0, 0, static_cast<float>(d)}, {0, 0, -1}, 2 * kPiDouble / (1 + d * d),
+                     fmt::format("disk from {}", d));
   // Four corner rectangles of side 1, seen from above their common corner.
   const SceneSnapshot square = test::build(areaLight("rectangle", ""));
   for (const double d : {0.3, 1.0, 20.0}) {
     const double a = 1 / std::sqrt(1 + d * d);
-    expectIrradiance(*square, {0, 0, static_cast<float>(d)}, {0, 0, -1}, 2 * 4 * a * std::atan(a), fmt::format("square from {}", d));
+    expectIrradiance(*square, {0, 0, static_cast<float>(d)}, {0, 0, -1}, 2 * 4 * a * std::atan(a),
+                     fmt::format("square from {}", d));
   }
   const SceneSnapshot inside = test::build(areaLight("sphere", "<boolean name=\"flip_normals\" value=\"true\"/>"));
   for (const Vec3 x : {Vec3(0), Vec3(0.3f, -0.4f, 0.1f), Vec3(0, 0, 0.7f)})
@@ -263,7 +287,8 @@ TEST(SphereLight, FarAwayItsUniformDensityIsStillExact) {
     // E[uniform / cone] = 1, as both integrate to 1 (the far half of a uniform sphere is not seen: a half).
     stats::Moments m;
     for (int i = 0; i < 20'000; ++i) {
-      const LightSample s = sampleLight(scene->view, scene->view.emitters[0], {0, 0, d}, {random.next(), random.next()});
+      const LightSample s =
+          sampleLight(scene->view, scene->view.emitters[0], {0, 0, d}, {random.next(), random.next()});
       m.add(static_cast<double>(s.pdf / s.uniformPdf));
     }
     // cone / uniform = area cos / (solid angle d^2) up to (d - r) / d: its mean is 4 * 2/3 for d >> r.
@@ -274,7 +299,8 @@ TEST(SphereLight, FarAwayItsUniformDensityIsStillExact) {
 
 TEST(PointLight, FallsWithTheSquare) {
   const SceneSnapshot scene = test::build(
-      "<emitter type=\"point\"><point name=\"position\" x=\"1\" y=\"2\" z=\"3\"/><rgb name=\"intensity\" value=\"8, 4, 2\"/></emitter>");
+      "<emitter type=\"point\"><point name=\"position\" x=\"1\" y=\"2\" z=\"3\"/><rgb name=\"intensity\" value=\"8, 4, "
+      "2\"/></emitter>");
   const LightSample s = sampleLight(scene->view, scene->view.emitters[0], {1, 2, -1}, {0.3f, 0.4f});
   EXPECT_TRUE(s.delta);
   EXPECT_EQ(s.pdf, 1);
@@ -286,7 +312,8 @@ TEST(PointLight, FallsWithTheSquare) {
 
 TEST(SpotLight, FallsLinearlyFromBeamToCutoff) {
   const SceneSnapshot scene = test::build(
-      "<emitter type=\"spot\"><transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, 0\"/></transform>"
+      "<emitter type=\"spot\"><transform name=\"to_world\"><lookat origin=\"0, 0, 5\" target=\"0, 0, 0\" up=\"0, 1, "
+      "0\"/></transform>"
       "<float name=\"cutoff_angle\" value=\"30\"/><float name=\"beam_width\" value=\"10\"/></emitter>");
   const auto at = [&](double degrees) {
     const auto x = static_cast<float>(5 * std::tan(degrees * kPiDouble / 180));
@@ -316,8 +343,9 @@ TEST(ConstantLight, SurroundsEverything) {
   const EmitterView& e = scene->view.emitters[0];
   EXPECT_EQ(scene->view.environment, 0);
   const auto p = [&](double factor) {
-    return stats::chiSquared({}, [&](Vec2 u) { return sampleLight(scene->view, e, {}, u).wi; },
-                             [&](Vec3 w) { return factor * static_cast<double>(environmentPdf(e, w)); });
+    return stats::chiSquared(
+        {}, [&](Vec2 u) { return sampleLight(scene->view, e, {}, u).wi; },
+        [&](Vec3 w) { return factor * static_cast<double>(environmentPdf(e, w)); });
   };
   EXPECT_GT(p(1), 1e-4);
   EXPECT_LT(p(0.98), 1e-4) << "the test cannot fail";
@@ -330,7 +358,8 @@ class Surroundings {
   explicit Surroundings(const Image& image, const std::string& inside = "") {
     path_ = std::filesystem::temp_directory_path() / fmt::format("virga_surroundings_{}.exr", getpid());
     writeExr(path_, image);
-    scene = test::build(fmt::format("<emitter type=\"envmap\"><string name=\"filename\" value=\"{}\"/>{}</emitter>", path_.string(), inside));
+    scene = test::build(fmt::format("<emitter type=\"envmap\"><string name=\"filename\" value=\"{}\"/>{}</emitter>",
+                                    path_.string(), inside));
   }
   ~Surroundings() { std::filesystem::remove(path_); }
   const EmitterView& emitter() const { return scene->view.emitters[0]; }
@@ -344,7 +373,8 @@ class Surroundings {
 Image noisy(int width, int height) {
   Image image(width, height);
   Pcg32 random(8);
-  for (Rgb& p : image.pixels) p = Rgb(random.next(), random.next(), random.next()) * (random.next() < 0.1f ? 20.f : 1.f);
+  for (Rgb& p : image.pixels)
+    p = Rgb(random.next(), random.next(), random.next()) * (random.next() < 0.1f ? 20.f : 1.f);
   return image;
 }
 
@@ -355,20 +385,22 @@ Image onePixel(int width, int height, int x, int y) {
 }
 
 double environmentP(const Surroundings& s, double factor) {
-  return stats::chiSquared({.axis = {0, 1, 0}},
-                           [&](Vec2 u) { return sampleLight(s.scene->view, s.emitter(), {}, u).wi; },
-                           [&](Vec3 w) { return factor * static_cast<double>(environmentPdf(s.emitter(), w)); });
+  return stats::chiSquared(
+      {.axis = {0, 1, 0}}, [&](Vec2 u) { return sampleLight(s.scene->view, s.emitter(), {}, u).wi; },
+      [&](Vec3 w) { return factor * static_cast<double>(environmentPdf(s.emitter(), w)); });
 }
 
 TEST(EnvironmentMap, DirectionsFollowTheDensity) {
   const std::string turned = transform("<rotate x=\"1\" y=\"0.4\" z=\"-0.2\" angle=\"130\"/>");
-  const Image images[] = {noisy(32, 16), noisy(7, 5), onePixel(32, 16, 20, 3), onePixel(16, 8, 0, 0), Image(1, 1, Rgb(1.f))};
+  const Image images[] = {noisy(32, 16), noisy(7, 5), onePixel(32, 16, 20, 3), onePixel(16, 8, 0, 0),
+                          Image(1, 1, Rgb(1.f))};
   for (const Image& image : images) {
     const Surroundings s(image);
     EXPECT_GT(environmentP(s, 1), 1e-4) << image.width;
     EXPECT_LT(environmentP(s, 0.98), 1e-4) << image.width << ": the test cannot fail";
     const Surroundings rotated(image, turned);
-    EXPECT_NEAR(stats::integrateSphere([&](Vec3 w) { return environmentPdf(rotated.emitter(), w); }, {0, 1, 0}, 1e-4), 1, 5e-3);
+    EXPECT_NEAR(stats::integrateSphere([&](Vec3 w) { return environmentPdf(rotated.emitter(), w); }, {0, 1, 0}, 1e-4),
+                1, 5e-3);
   }
 }
 
@@ -383,7 +415,8 @@ TEST(EnvironmentMap, ReportsWhatItsFunctionsGiveAndMissesNoLight) {
       const float pdf = environmentPdf(s.emitter(), light.wi);
       // On the border of two pixels the direction may round to the other one.
       if (std::fabs(light.pdf / pdf - 1) > 1e-3f) {
-        const float near = environmentPdf(s.emitter(), normalize(light.wi + uniformSphere({random.next(), random.next()}) * 1e-5f));
+        const float near =
+            environmentPdf(s.emitter(), normalize(light.wi + uniformSphere({random.next(), random.next()}) * 1e-5f));
         ASSERT_TRUE(near > 0 || pdf > 0);
       }
       const Vec3 w = uniformSphere({random.next(), random.next()});
@@ -393,7 +426,8 @@ TEST(EnvironmentMap, ReportsWhatItsFunctionsGiveAndMissesNoLight) {
     }
     for (const Vec3 n : {Vec3(0, 0, 1), normalize(Vec3(1, -2, 0.5f))}) {
       const double truth = stats::integrateSphere(
-          [&](Vec3 w) { return static_cast<double>(environmentRadiance(s.emitter(), w).r * std::max(0.f, dot(w, n))); }, {0, 1, 0}, 1e-4);
+          [&](Vec3 w) { return static_cast<double>(environmentRadiance(s.emitter(), w).r * std::max(0.f, dot(w, n))); },
+          {0, 1, 0}, 1e-4);
       if (truth > 1e-3) expectIrradiance(*s.scene, {}, n, truth, "environment");
     }
   }

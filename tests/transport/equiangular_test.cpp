@@ -80,7 +80,8 @@ TEST(EquiangularSegment, AWrongLightIsNoticed) {
   for (const Case& c : kCases) {
     if (c.flat) continue;
     Scene scene(c);
-    const float shift = c.height > 0.5f ? 0.4f * c.height + 0.5f : 0.2f * std::max(c.height, 0.5f * std::fabs(c.foot - c.t0));
+    const float shift =
+        c.height > 0.5f ? 0.4f * c.height + 0.5f : 0.2f * std::max(c.height, 0.5f * std::fabs(c.foot - c.t0));
     scene.light += scene.segment.ray.d * shift;
     EXPECT_LT(samplingP(c, scene.segment, scene.light), 1e-4) << c.name;
   }
@@ -98,7 +99,8 @@ TEST(EquiangularSegment, DensityIntegratesToOne) {
     const double integral = stats::integrateInterval(
         [&](double angle) {
           const double t = foot + height * std::tan(angle), cosine = std::cos(angle);
-          return static_cast<double>(scene.segment.pdf(scene.light, static_cast<float>(t))) * height / (cosine * cosine);
+          return static_cast<double>(scene.segment.pdf(scene.light, static_cast<float>(t))) * height /
+                 (cosine * cosine);
         },
         lo, hi, 1e-6);
     EXPECT_NEAR(integral, 1, 3e-3) << c.name;
@@ -130,7 +132,8 @@ TEST(EquiangularSegment, EstimatesTheIntegralOfTheInverseSquare) {
     const double height = static_cast<double>(c.height), foot = static_cast<double>(c.foot);
     const double x0 = static_cast<double>(c.t0) - foot, x1 = static_cast<double>(c.t1) - foot;
     // atan b - atan a without cancellation
-    const double angle = std::isinf(x1) ? std::atan2(height, x0) : std::atan2(height * (x1 - x0), height * height + x0 * x1);
+    const double angle =
+        std::isinf(x1) ? std::atan2(height, x0) : std::atan2(height * (x1 - x0), height * height + x0 * x1);
     stats::Moments m;
     Pcg32 random(5);
     for (int i = 0; i < 20'000; ++i) {

@@ -82,7 +82,8 @@ Field denseField(const std::string& name, const Values& at, const Matrix4& index
 double treeValue(int i, int j, int k) {
   if (i < 0 || j < 0 || k < 0 || i > 25 || j > 11 || k > 8) return -1;
   if ((i / 5 + j / 4 + k / 3) % 3 == 1) return -1;
-  return static_cast<double>(static_cast<float>(hash32(static_cast<uint32_t>(i + 100 * j + 10000 * k)) >> 8) * 0x1p-24f);
+  return static_cast<double>(static_cast<float>(hash32(static_cast<uint32_t>(i + 100 * j + 10000 * k)) >> 8) *
+                             0x1p-24f);
 }
 
 AlignedBytes treeBytes(float background) {
@@ -128,7 +129,8 @@ Matrix4 turnedAndStretched() {
 
 std::vector<Field> makeFields() {
   const Values lumps = [](int i, int j, int k) {
-    return static_cast<double>(static_cast<float>(hash32(static_cast<uint32_t>(i + 97 * j + 5003 * k)) >> 8) * 0x1p-24f);
+    return static_cast<double>(static_cast<float>(hash32(static_cast<uint32_t>(i + 97 * j + 5003 * k)) >> 8) *
+                               0x1p-24f);
   };
   const Values holes = [lumps](int i, int j, int k) { return i / 4 % 2 == 0 || k > 4 ? 0.0 : 3 * lumps(i, j, k); };
   const Values ones = [](int, int, int) { return 1.0; };
@@ -149,7 +151,8 @@ std::vector<Field> makeFields() {
 
 Triple mapped(const Matrix4& m, const Triple& v, double w) {
   Triple r{};
-  for (int i = 0; i < 3; ++i) r[static_cast<size_t>(i)] = m(i, 0) * v[0] + m(i, 1) * v[1] + m(i, 2) * v[2] + m(i, 3) * w;
+  for (int i = 0; i < 3; ++i)
+    r[static_cast<size_t>(i)] = m(i, 0) * v[0] + m(i, 1) * v[1] + m(i, 2) * v[2] + m(i, 3) * w;
   return r;
 }
 
@@ -231,8 +234,8 @@ double OpticalDepth::densityAt(double t) const {
 // Gauss-Legendre with three points: exact for polynomials of degree 5.
 double OpticalDepth::piece(double a, double b) const {
   const double middle = 0.5 * (a + b), half = 0.5 * (b - a), off = half * std::sqrt(0.6);
-  return field_->sigmaT() * half *
-         (5 * densityAt(middle - off) + 8 * densityAt(middle) + 5 * densityAt(middle + off)) / 9;
+  return field_->sigmaT() * half * (5 * densityAt(middle - off) + 8 * densityAt(middle) + 5 * densityAt(middle + off)) /
+         9;
 }
 
 double OpticalDepth::until(double t) const {

@@ -28,8 +28,8 @@ struct Field {
   double sigmaT() const { return static_cast<double>(medium.sigmaT); }
 };
 
-/// Every kind of medium: homogeneous, dense (one value; lumps; with holes), sparse, with a background, with majorants that the
-/// density meets exactly, turned and stretched.
+/// Every kind of medium: homogeneous, dense (one value; lumps; with holes), sparse, with a background, with majorants
+/// that the density meets exactly, turned and stretched.
 const std::vector<Field>& fields();
 
 /// A part of a ray, in world coordinates.
@@ -42,7 +42,8 @@ struct RayPart {
 /// Through, along, beside and away from a field's support; from outside and from within.
 std::vector<RayPart> raysThrough(const Field& field);
 
-/// Optical depth along a ray, exact up to rounding: between planes of voxel centres the density is a cubic polynomial of t.
+/// Optical depth along a ray, exact up to rounding: between planes of voxel centres the density is a cubic polynomial
+/// of t.
 class OpticalDepth {
  public:
   OpticalDepth(const Field& field, const RayPart& part);

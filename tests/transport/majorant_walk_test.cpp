@@ -32,7 +32,8 @@ float outside(const NumberedGrid& grid, float value, Vec3 p) {
   float worst = 0;
   const std::array<int, 3> cell = grid.cellOf(value);
   for (int a = 0; a < 3; ++a) {
-    const float x = (p[a] - grid.view.origin[a]) / grid.view.cellSize[a], c = static_cast<float>(cell[static_cast<size_t>(a)]);
+    const float x = (p[a] - grid.view.origin[a]) / grid.view.cellSize[a],
+                c = static_cast<float>(cell[static_cast<size_t>(a)]);
     worst = std::max({worst, c - x, x - c - 1});
   }
   return worst;
@@ -66,7 +67,8 @@ class RandomRays {
   /// Inside, outside, far away, on borders of cells.
   Vec3 origin(const NumberedGrid& g) {
     const Vec3 size = g.hi() - g.view.origin;
-    if (random_.next() < 0.1f) return g.view.origin + size * 0.5f + uniformSphere({random_.next(), random_.next()}) * 1e4f;
+    if (random_.next() < 0.1f)
+      return g.view.origin + size * 0.5f + uniformSphere({random_.next(), random_.next()}) * 1e4f;
     Vec3 p = between(g.view.origin - size, g.hi() + size);
     for (int a = 0; a < 3; ++a)
       if (random_.next() < 0.3f) p[a] = border(g, a);
@@ -132,7 +134,8 @@ TEST(WalkMajorants, VisitsEveryCellOfARowOnce) {
 TEST(WalkMajorants, StopsWhenTold) {
   const NumberedGrid grid({8, 1, 1}, Vec3(0), Vec3(1));
   int visited = 0;
-  EXPECT_FALSE(walkMajorants(grid.view, {0, 0.5f, 0.5f}, {1, 0, 0}, 0, 8, [&](float, float, float) { return ++visited < 3; }));
+  EXPECT_FALSE(
+      walkMajorants(grid.view, {0, 0.5f, 0.5f}, {1, 0, 0}, 0, 8, [&](float, float, float) { return ++visited < 3; }));
   EXPECT_EQ(visited, 3);
   EXPECT_TRUE(walkMajorants(grid.view, {0, 0.5f, 0.5f}, {1, 0, 0}, 0, 8, [&](float, float, float) { return true; }));
 }

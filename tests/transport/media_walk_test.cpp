@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which media a ray passes. Every medium has a power of two as its coefficient, so that a sum tells which ones are there.
+// Which media a ray passes. Every medium has a power of two as its coefficient, so that a sum tells which ones are
+// there.
 #include "transport/media_walk.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
-#include <unistd.h>
 
 #include "core/warp.h"
 #include "scene/scenes.h"
@@ -16,16 +17,18 @@ namespace virga {
 namespace {
 
 std::string medium(const std::string& side, int sigmaT) {
-  return fmt::format("<medium name=\"{}\" type=\"homogeneous\"><float name=\"sigma_t\" value=\"{}\"/></medium>", side, sigmaT);
+  return fmt::format("<medium name=\"{}\" type=\"homogeneous\"><float name=\"sigma_t\" value=\"{}\"/></medium>", side,
+                     sigmaT);
 }
 
 std::string volume(const std::string& shape, const std::string& content, const std::string& transform) {
-  return fmt::format("<shape type=\"{}\"><bsdf type=\"null\"/><transform name=\"to_world\">{}</transform>{}</shape>\n", shape,
-                     transform, content);
+  return fmt::format("<shape type=\"{}\"><bsdf type=\"null\"/><transform name=\"to_world\">{}</transform>{}</shape>\n",
+                     shape, transform, content);
 }
 
 std::string placed(Vec3 at, Vec3 scale) {
-  return fmt::format("<scale value=\"{}, {}, {}\"/><translate value=\"{}, {}, {}\"/>", scale.x, scale.y, scale.z, at.x, at.y, at.z);
+  return fmt::format("<scale value=\"{}, {}, {}\"/><translate value=\"{}, {}, {}\"/>", scale.x, scale.y, scale.z, at.x,
+                     at.y, at.z);
 }
 
 std::string boxVolume(const Bounds& b, int sigmaT) {
@@ -58,7 +61,8 @@ class Folder {
 };
 
 std::string meshVolume(const std::string& file, int sigmaT, const std::string& transform = "") {
-  return volume("obj", fmt::format("<string name=\"filename\" value=\"{}\"/>", file) + medium("interior", sigmaT), transform);
+  return volume("obj", fmt::format("<string name=\"filename\" value=\"{}\"/>", file) + medium("interior", sigmaT),
+                transform);
 }
 
 /// Sum of the coefficients of the media in a state.
@@ -98,8 +102,8 @@ template <class Truth>
     const float t = std::isinf(i.t1) ? i.t0 + 100 : 0.5f * (i.t0 + i.t1);
     const Vec3 p = ray.ray.at(t);
     if (i.media != truth(p))
-      return ::testing::AssertionFailure() << fmt::format("{} instead of {} at ({}, {}, {}), t {} in [{}, {}]", i.media, truth(p),
-                                                          p.x, p.y, p.z, t, i.t0, i.t1);
+      return ::testing::AssertionFailure() << fmt::format("{} instead of {} at ({}, {}, {}), t {} in [{}, {}]", i.media,
+                                                          truth(p), p.x, p.y, p.z, t, i.t0, i.t1);
   }
   return ::testing::AssertionSuccess();
 }
@@ -120,9 +124,10 @@ TEST(WalkMedia, OverlappingVolumesAdd) {
   const Bounds a{Vec3(-2, -1, -1), Vec3(0.5f, 1, 1)}, b{Vec3(0, -0.7f, -2), Vec3(2, 1.5f, 2)}, c{Vec3(-1), Vec3(1)};
   folder.writeBoxes("c.obj", {c});
   for (const bool many : {false, true}) {  // few analytic boundaries are asked one by one, more through a traversal
-    const SceneSnapshot scene = test::build(boxVolume(a, 1) + boxVolume(b, 2) + (many ? meshVolume("c.obj", 4) : "") +
-                                                volume("sphere", medium("interior", 8), placed(Vec3(-1, 0, 0), Vec3(1.2f))),
-                                            folder.path());
+    const SceneSnapshot scene =
+        test::build(boxVolume(a, 1) + boxVolume(b, 2) + (many ? meshVolume("c.obj", 4) : "") +
+                        volume("sphere", medium("interior", 8), placed(Vec3(-1, 0, 0), Vec3(1.2f))),
+                    folder.path());
     const auto truth = [&](Vec3 p) {
       return (contains(a, p) ? 1 : 0) + (contains(b, p) ? 2 : 0) + (many && contains(c, p) ? 4 : 0) +
              (distance(p, {-1, 0, 0}) < 1.2f ? 8 : 0);
@@ -151,7 +156,8 @@ TEST(WalkMedia, TouchingVolumesLeaveNoGap) {
 }
 
 TEST(WalkMedia, ADeclaredExteriorReplaces) {
-  const std::string inner = volume("sphere", medium("interior", 2) + medium("exterior", 1), placed(Vec3(0.2f), Vec3(0.5f)));
+  const std::string inner =
+      volume("sphere", medium("interior", 2) + medium("exterior", 1), placed(Vec3(0.2f), Vec3(0.5f)));
   const SceneSnapshot scene = test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + inner);
   const auto truth = [](Vec3 p) {
     if (distance(p, Vec3(0.2f)) < 0.5f) return 2;
@@ -169,11 +175,13 @@ TEST(WalkMedia, ADeclaredExteriorReplaces) {
 TEST(WalkMedia, MoreCrossingsThanOneListHolds) {
   const Folder folder;
   std::vector<Bounds> slices;
-  for (int i = 0; i < 100; ++i) slices.push_back({Vec3(static_cast<float>(i), -1, -1), Vec3(static_cast<float>(i) + 0.5f, 1, 1)});
+  for (int i = 0; i < 100; ++i)
+    slices.push_back({Vec3(static_cast<float>(i), -1, -1), Vec3(static_cast<float>(i) + 0.5f, 1, 1)});
   folder.writeBoxes("slices.obj", slices);
   const SceneSnapshot scene = test::build(meshVolume("slices.obj", 1), folder.path());
   const auto truth = [](Vec3 p) {
-    const bool inside = std::fabs(p.y) < 1 && std::fabs(p.z) < 1 && p.x > 0 && p.x < 99.5f && p.x - std::floor(p.x) < 0.5f;
+    const bool inside =
+        std::fabs(p.y) < 1 && std::fabs(p.z) < 1 && p.x > 0 && p.x < 99.5f && p.x - std::floor(p.x) < 0.5f;
     return inside ? 1 : 0;
   };
   Pcg32 random(4);
@@ -212,7 +220,8 @@ TEST(WalkMedia, ManyTouchingVolumes) {
   }
 }
 
-// Rays at corners and at points of edges, diagonals of faces among them: met by several triangles, or seen from the side.
+// Rays at corners and at points of edges, diagonals of faces among them: met by several triangles, or seen from the
+// side.
 TEST(WalkMedia, EdgesAndCornersOfAMesh) {
   const Folder folder;
   const Bounds box{Vec3(-1), Vec3(1)};
@@ -233,8 +242,8 @@ TEST(WalkMedia, EdgesAndCornersOfAMesh) {
     MediaState state;
     if (inside) state.enter(0, scene->view.boundaries[0].interior);
     const std::vector<Interval> found = intervals(*scene, {ray, state, 0});
-    ASSERT_EQ(found.back().media, 0) << fmt::format("({}, {}, {}) toward ({}, {}, {}): never leaves", o.x, o.y, o.z, target.x,
-                                                    target.y, target.z);
+    ASSERT_EQ(found.back().media, 0) << fmt::format("({}, {}, {}) toward ({}, {}, {}): never leaves", o.x, o.y, o.z,
+                                                    target.x, target.y, target.z);
     for (const Interval& part : found) {
       if (part.t1 - part.t0 < 1e-4f || std::isinf(part.t1)) continue;
       const Vec3 p = ray.at(0.5f * (part.t0 + part.t1));
@@ -285,11 +294,10 @@ TEST(WalkMedia, AVolumeThatStandsOnTheGround) {
   for (const bool mesh : {false, true}) {
     const Bounds box{Vec3(-1, -1, 0.3f), Vec3(1, 1, 2.3f)};
     folder.writeBoxes("box.obj", {box});
-    const SceneSnapshot scene =
-        test::build((mesh ? meshVolume("box.obj", 1) : boxVolume(box, 1)) +
-                        "<shape type=\"rectangle\"><transform name=\"to_world\">" + placed(Vec3(0, 0, 0.3f), Vec3(5)) +
-                        "</transform></shape>",
-                    folder.path());
+    const SceneSnapshot scene = test::build((mesh ? meshVolume("box.obj", 1) : boxVolume(box, 1)) +
+                                                "<shape type=\"rectangle\"><transform name=\"to_world\">" +
+                                                placed(Vec3(0, 0, 0.3f), Vec3(5)) + "</transform></shape>",
+                                            folder.path());
     const auto truth = [&](Vec3 p) { return contains(box, p) ? 1 : 0; };
     Pcg32 random(8);
     for (int i = 0; i < 50'000; ++i) {
@@ -298,7 +306,8 @@ TEST(WalkMedia, AVolumeThatStandsOnTheGround) {
       const float height = i % 2 == 0 ? random.next() : std::pow(10.f, -3 * random.next());
       const float phi = kTwoPi * random.next();
       const Vec3 w = sphericalDirection(std::sqrt(1 - height * height), height, phi);
-      const Vec3 from = target + sphericalDirection(std::sqrt(1 - height * height), height, kTwoPi * random.next()) * 3.f;
+      const Vec3 from =
+          target + sphericalDirection(std::sqrt(1 - height * height), height, kTwoPi * random.next()) * 3.f;
       if (from.z < 0.31f) continue;
       MediaRay arriving{{from, normalize(target - from)}, stateAt(*scene, from), 0};
       const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
@@ -313,7 +322,8 @@ TEST(WalkMedia, AVolumeThatStandsOnTheGround) {
 }
 
 TEST(WalkMedia, StopsWhenTold) {
-  const SceneSnapshot scene = test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + boxVolume({Vec3(2, -1, -1), Vec3(3, 1, 1)}, 2));
+  const SceneSnapshot scene =
+      test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + boxVolume({Vec3(2, -1, -1), Vec3(3, 1, 1)}, 2));
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
   MediaRay ray{{{-5, 0, 0}, {1, 0, 0}}, {}, 0};
   int visited = 0;
@@ -340,7 +350,8 @@ TEST(Collisions, OfOverlappingVolumesAddUp) {
 }
 
 TEST(Collisions, TransmittanceIsTheProductOverAllIntervals) {
-  const SceneSnapshot scene = test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + boxVolume({Vec3(0, -1, -1), Vec3(3, 1, 1)}, 2));
+  const SceneSnapshot scene =
+      test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + boxVolume({Vec3(0, -1, -1), Vec3(3, 1, 1)}, 2));
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
   Pcg32 random(10);
   const MediaRay ray{{{-1.5f, 0.1f, 0.2f}, {1, 0, 0}}, {}, 0};

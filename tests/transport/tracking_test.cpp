@@ -69,7 +69,8 @@ TEST(FreeFlight, SkipsHoles) {
   Pcg32 random(3);
   int found = 0;
   for (int i = 0; i < 20'000; ++i) {
-    const Ray ray{{-3, 11 * random.next(), 8 * random.next()}, normalize(Vec3(1, random.next() - 0.5f, random.next() - 0.5f))};
+    const Ray ray{{-3, 11 * random.next(), 8 * random.next()},
+                  normalize(Vec3(1, random.next() - 0.5f, random.next() - 0.5f))};
     const float t = sampleFreeFlight(field.medium, ray, 0, kInfinity, random);
     if (std::isinf(t)) continue;
     ++found;
