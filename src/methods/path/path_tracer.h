@@ -163,11 +163,18 @@ class PathTracer {
 
   // --- next-event estimation ---
 
-  /// Transmittance times visibility from a point toward a light; 0 where a surface is in the way.
-  VIRGA_HD float visibility(const MediaRay& r, float lightDistance, Sampler& sampler) const {
-    // Stop short of the light's own surface.
-    const float tMax = std::isinf(lightDistance) ? kInfinity : lightDistance * (1 - 2 * kHitError) - kHitError * 1e-2f * scene_.scale;
-    if (tMax <= 0) return 1;
+  /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way. `r` starts
+  /// at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it is expected to.
+  VIRGA_HD float visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
+    float tMax = kInfinity;
+    if (!std::isinf(light.distance)) {
+      const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
+      const float d = length(toLight);
+      // Stop short of the light's own surface: beyond the errors of both ends, whose coordinates may be large.
+      tMax = d * (1 - 2 * kHitError) - kHitError * std::max(0.1f * maxComponent(abs(r.ray.o)), 1e-2f * scene_.scale);
+      if (tMax <= 0) return 1;
+      r.ray.d = toLight / d;
+    }
     if (rays_.occluded(r.ray, tMax)) return 0;
     return transmittance(scene_, rays_, r, tMax, sampler.stream());
   }
@@ -212,7 +219,7 @@ class PathTracer {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
       w = weight(own, flight * choice.probability * connection, flight * medium.phase.pdf(wo, light.wi));
     }
-    const float seen = visibility({{x, light.wi}, media, 0}, light.distance, sampler);
+    const float seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
     layers.scatter(LayerPath::Vertex::medium);
     // sigma_s tau = albedo * flight
@@ -234,7 +241,7 @@ class PathTracer {
       const float flight = segment.freeFlightPdf(path.last.t);
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
-    const float seen = visibility({{x, c.light.wi}, media, 0}, c.light.distance, sampler);
+    const float seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
     if (seen > 0) path.add(path.layers, c.light.radiance * (medium.phase.value(wo, c.light.wi) * seen * w / own));
   }
 
@@ -249,7 +256,7 @@ class PathTracer {
     if (isBlack(value)) return;
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
-    const float seen = visibility(leaveSurface(point, c.light.wi, media), c.light.distance, sampler);
+    const float seen = visibility(leaveSurface(point, c.light.wi, media), point.p, c.light, sampler);
     if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
   }
 
