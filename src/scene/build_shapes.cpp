@@ -44,6 +44,18 @@ void keepOutside(TriangleMesh& mesh, const Matrix4& toWorld) {
     for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
+// The inside of a closed boundary is where its volume is, however its triangles are wound: by the sign of that volume.
+void turnOutward(TriangleMesh& mesh) {
+  double sixfold = 0;
+  const Vec3 origin = mesh.positions.front();
+  for (const auto& t : mesh.triangles) {
+    const Vec3 a = mesh.positions[t[0]] - origin, b = mesh.positions[t[1]] - origin, c = mesh.positions[t[2]] - origin;
+    sixfold += static_cast<double>(dot(a, cross(b, c)));
+  }
+  if (sixfold < 0)
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
+}
+
 void buildRectangle(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   const Matrix4 toWorld = reader.transform("to_world");
   shape.mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
@@ -105,7 +117,7 @@ void buildDisk(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
 }
 
 template <MeshFormat format>
-void buildMesh(BuildContext& context, PluginReader& reader, Role, BuiltShape& shape) {
+void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShape& shape) {
   const std::filesystem::path path = context.file(reader, "filename");
   try {
     shape.mesh = loadMesh(path, format);
@@ -115,6 +127,7 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role, BuiltShape& sh
   if (reader.boolean("face_normals", false)) shape.mesh.normals.clear();
   reader.ignore("flip_tex_coords");
   toWorldSpace(shape.mesh, reader.transform("to_world"));
+  if (role == Role::boundary) turnOutward(shape.mesh);
   finishMesh(shape);
 }
 

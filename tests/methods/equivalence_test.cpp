@@ -144,15 +144,19 @@ TEST(Equivalence, AMediumBelowTheGroundIsNotSeen) {
              sensor() + kLamp + ground + box(homogeneous(2), R"(<scale y="0.75"/><translate y="0.25"/>)"));
 }
 
-TEST(Equivalence, AMeshBoundaryIsACube) {
+TEST(Equivalence, AMeshBoundaryIsACubeHoweverItIsWound) {
   const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "cube.obj";
   FILE* file = std::fopen(path.c_str(), "w");
   for (int i = 0; i < 8; ++i) std::fprintf(file, "v %d %d %d\n", i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
   std::fputs("f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n", file);
   std::fclose(file);
-  expectSame(sensor() + kLamp + kGround + box(homogeneous(2)),
-             sensor() + kLamp + kGround + R"(<shape type="obj"><string name="filename" value="cube.obj"/><bsdf type="null"/>)" +
-                 homogeneous(2) + "</shape>");
+  const std::string world = sensor() + kLamp + kGround;
+  const auto mesh = [&](const std::string& transform) {
+    return R"(<shape type="obj"><string name="filename" value="cube.obj"/><bsdf type="null"/><transform name="to_world">)" + transform +
+           "</transform>" + homogeneous(2) + "</shape>";
+  };
+  expectSame(world + box(homogeneous(2)), world + mesh(""));
+  expectSame(world + box(homogeneous(2)), world + mesh(R"(<scale x="-1"/>)"));
 }
 
 TEST(Equivalence, GlassOfIndexOneIsANullBoundary) {
