@@ -38,6 +38,8 @@ struct MediumTransition {
   VIRGA_HD bool declared() const { return replaces || interior != kNone; }
 };
 
+enum class Passing : uint8_t { inward, outward };
+
 /// Which media a point lies in. Two mechanisms (docs/scene-format.md): a boundary that *replaces* sets the base medium; closed
 /// null boundaries *add* their interior while the point is inside them. Applying a crossing twice changes nothing, so double
 /// hits on shared edges and coplanar faces do no harm.
@@ -46,11 +48,24 @@ class MediaState {
   static constexpr int kCapacity = 8;
   static constexpr int kNone = MediumTransition::kNone;
 
-  VIRGA_HD void setBase(int medium) { base_ = medium, exclusive_ = false; }
+  VIRGA_HD void setBase(int medium) { base_ = medium, exclusive_ = false, hidden_ = 0; }
   VIRGA_HD int base() const { return base_; }
 
-  /// Passing a boundary that replaces, to the side with this medium.
-  VIRGA_HD void replace(int medium) { base_ = medium, exclusive_ = medium != kNone; }
+  /// Passing a boundary that replaces.
+  VIRGA_HD void pass(const MediumTransition& boundary, Passing way) {
+    if (way == Passing::inward)
+      replace(boundary.interior);
+    else
+      returnTo(boundary.exterior);
+  }
+  /// Into a shape that replaces: its medium, or vacuum, hides all others around it.
+  VIRGA_HD void replace(int medium) { base_ = medium, exclusive_ = medium != kNone, hidden_ = count_; }
+  /// Out of it. If its exterior is one of the media in which it lies, or not declared, all those are there again: what is where
+  /// must not depend on the way.
+  VIRGA_HD void returnTo(int medium) {
+    base_ = medium, exclusive_ = false, hidden_ = 0;
+    exclusive_ = baseCounts();
+  }
   /// Entering additive boundary `boundary` whose interior is `medium`.
   VIRGA_HD void enter(int boundary, int medium) {
     for (int i = 0; i < count_; ++i)
@@ -61,22 +76,24 @@ class MediaState {
       overflowed_ = true;
   }
   VIRGA_HD void leave(int boundary, int medium) {
-    for (int i = 0; i < count_; ++i)
-      if (inside_[i].boundary == boundary) {
-        inside_[i] = inside_[--count_];
-        break;
-      }
-    if (base_ == medium) replace(kNone);
+    int kept = 0, hidden = 0;
+    for (int i = 0; i < count_; ++i) {
+      if (inside_[i].boundary == boundary) continue;
+      hidden += i < hidden_ ? 1 : 0;
+      inside_[kept++] = inside_[i];
+    }
+    count_ = kept, hidden_ = hidden;
+    if (base_ == medium) returnTo(kNone);
   }
 
   /// Media whose coefficients add up here.
   VIRGA_HD int count() const {
     if (exclusive_) return 1;
-    return count_ + (baseCounts() ? 1 : 0);
+    return count_ - hidden_ + (baseCounts() ? 1 : 0);
   }
   VIRGA_HD int medium(int i) const {
     if (exclusive_) return base_;
-    return i < count_ ? inside_[i].medium : base_;
+    return hidden_ + i < count_ ? inside_[hidden_ + i].medium : base_;
   }
   VIRGA_HD bool vacuum() const { return count() == 0; }
   VIRGA_HD bool overflowed() const { return overflowed_; }
@@ -98,6 +115,7 @@ class MediaState {
   int base_ = kNone;
   bool exclusive_ = false, overflowed_ = false;
   int count_ = 0;
+  int hidden_ = 0;  ///< of the first ones: around a shape that replaces by vacuum
   Inside inside_[kCapacity];
 };
 

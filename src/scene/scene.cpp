@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <vector>
 
 #include "core/random.h"
 
@@ -112,7 +113,7 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
   // replace, the nearest is the innermost.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
   Surroundings base = enclosingSurface(scene.view, *scene.surfaceRays, ray);
-  MediaState state;
+  std::vector<Crossing> around;
   std::set<uint32_t> seen;
   CrossingList list;
   for (float from = 0;; list.clear()) {
@@ -121,15 +122,23 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
       const Crossing& c = list.items[i];
       if (!seen.insert(c.shape).second) continue;
       const MediumTransition& media = scene.view.boundaries[c.shape];
-      if (!media.replaces && !c.entering) state.enter(static_cast<int>(c.shape), media.interior);
-      if (media.replaces && !c.entering && c.t < base.t) base = {c.t, media.interior};
+      if (c.entering) continue;
+      if (!media.replaces) around.push_back(c);
+      if (media.replaces && c.t < base.t) base = {c.t, media.interior};
     }
     if (list.complete) break;
     // Once more from the last one: others may lie at the same distance.
     const float last = list.items[list.count - 1].t, before = std::nextafter(last, -kInfinity);
     from = before > from ? before : std::nextafter(last, kInfinity);
   }
-  if (base.medium != MediumTransition::kNone) state.replace(base.medium);
+  // As if they had been entered from outside: what lies farther than the one that replaces, that one, what lies within it.
+  MediaState state;
+  const auto enter = [&](const Crossing& c) { state.enter(static_cast<int>(c.shape), scene.view.boundaries[c.shape].interior); };
+  for (const Crossing& c : around)
+    if (c.t >= base.t) enter(c);
+  if (base.t < kInfinity) state.replace(base.medium);
+  for (const Crossing& c : around)
+    if (c.t < base.t) enter(c);
   return state;
 }
 

@@ -25,7 +25,7 @@ VIRGA_HD inline MediaRay leaveSurface(const SurfacePoint& point, Vec3 w, const M
 VIRGA_HD inline void applyCrossing(const SceneView& scene, const Crossing& crossing, MediaState& media) {
   const MediumTransition& transition = scene.boundaries[crossing.shape];
   if (transition.replaces) {
-    media.replace(crossing.entering ? transition.interior : transition.exterior);
+    media.pass(transition, crossing.entering ? Passing::inward : Passing::outward);
   } else if (crossing.entering) {
     media.enter(static_cast<int>(crossing.shape), transition.interior);
   } else {

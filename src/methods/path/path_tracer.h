@@ -317,7 +317,7 @@ class PathTracer {
     path.at = leaveSurface(point, wi, media);
     const bool passes = dot(wi, point.geometricNormal) * dot(wo, point.geometricNormal) < 0;
     if (passes && shape.media.replaces)
-      path.at.media.replace(dot(wi, point.geometricNormal) < 0 ? shape.media.interior : shape.media.exterior);
+      path.at.media.pass(shape.media, dot(wi, point.geometricNormal) < 0 ? Passing::inward : Passing::outward);
     path.tMax = kInfinity;
     ++path.depth;
     return survives(path, sampler);
