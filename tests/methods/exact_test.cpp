@@ -124,5 +124,24 @@ TEST(Airlight, SingleScatteringAgreesWithQuadrature) {
     }
 }
 
+// A sphere of radiance L that is wholly above the horizon sends the irradiance pi L (r / d)^2 cos(theta), however near it is and
+// wherever the coordinates have their origin.
+TEST(Exact, SphereLightOverAFloor) {
+  const double radius = 0.9, height = 2.25;
+  for (const double offset : {0.0, 3.0, -300.0})
+    for (const double side : {0.0, 0.7, 3.0}) {
+      const auto at = [&](double x, double y, double z) { return fmt::format("{}, {}, {}", x + offset, y, z - offset); };
+      const std::string scene = pinpointSensor(at(side + 1, 2, 4), at(side, 0, 0), "0, 1, 0", 16) + fmt::format(R"(
+        <shape type="sphere"><transform name="to_world"><scale value="{}"/><translate value="{}"/></transform>
+        <emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>
+        <shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/><translate value="{}"/></transform>
+        </shape>)", radius, at(0, height, 0), at(0, 0, 0));
+      const stats::Moments m = pixelMoments(rendered(sceneOf(scene), {.passes = 64}).film().beauty());
+      const double d = std::hypot(height, side), exact = 0.5 * 5 * std::pow(radius / d, 2) * height / d;
+      EXPECT_NEAR(m.mean() / exact, 1, std::max(4 * m.standardError() / exact, 1e-3)) << "offset " << offset << ", side " << side;
+      EXPECT_LT(m.standardError() / exact, 2e-3);
+    }
+}
+
 }  // namespace
 }  // namespace virga
