@@ -8,7 +8,7 @@ packages=(
   libembree-dev libtbb-dev
   libopenvdb-dev libnanovdb-dev libboost-iostreams-dev libblosc-dev zlib1g-dev
   libopenexr-dev libimath-dev libstb-dev
-  libpugixml-dev libassimp-dev
+  libpugixml-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
   libgtest-dev libbenchmark-dev
 )

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <csignal>
 #include <cstdio>
 #include <new>
 
@@ -20,6 +21,7 @@ int fail(int code, const char* text) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error of its write, not the end of the program
   try {
     const int code = virga::app::runCommandLine(argc, argv);
     if (std::fflush(stdout) != 0) return fail(kBadInput, "error: cannot write to the standard output");

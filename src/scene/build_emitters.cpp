@@ -150,6 +150,7 @@ void buildEmitter(BuildContext& context, const Node& node) {
                                                    {"envmap", buildEnvironment}, {"area", nullptr}};
   const Build build = findPlugin(node, kEmitters, kNotYet);
   PluginReader reader(node, context.diagnostics);
+  if (!build && !node.hasGeneratedId()) return;  // a definition for shapes to refer to, which check it
   if (!build) reader.failHere("an area emitter belongs inside a shape");
   const EmitterView emitter = build(context, reader);
   reader.ignore("sampling_weight");

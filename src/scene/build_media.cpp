@@ -162,6 +162,20 @@ void readSigmaT(BuildContext& context, PluginReader& reader, MediumView& medium)
   medium.worldToDensity = Affine(field.indexToWorld.inverse());
 }
 
+// Steps of tracking are of the order of a mean free path: beyond this they drown in the rounding of distances.
+void requireTrackable(PluginReader& reader, const MediumView& medium) {
+  constexpr float kMostMeanFreePaths = 1e6f;
+  const GridView& g = medium.density;
+  float densest = g.background;
+  const size_t cells = static_cast<size_t>(g.majorant.nx) * static_cast<size_t>(g.majorant.ny) * static_cast<size_t>(g.majorant.nz);
+  for (size_t i = 0; i < cells; ++i) densest = std::max(densest, g.majorant.values[i]);
+  const float across = length(g.supportHi - g.supportLo) / length(medium.worldToDensity.x);
+  const float thickness = densest * medium.sigmaT * across;
+  if (!(thickness <= kMostMeanFreePaths))
+    reader.fail("scale", fmt::format("the medium is {:.2g} mean free paths thick; at most {:.0e} can be tracked", thickness, kMostMeanFreePaths),
+                "reduce \"scale\"");
+}
+
 MediumView readMedium(BuildContext& context, PluginReader& reader) {
   MediumView medium;
   if (reader.has("sigma_s") || reader.has("sigma_a")) {
@@ -174,6 +188,7 @@ MediumView readMedium(BuildContext& context, PluginReader& reader) {
   }
   medium.sigmaT *= reader.number("scale", 1, reader.nonNegative());
   if (!std::isfinite(medium.sigmaT)) reader.fail("scale", "\"scale\" times \"sigma_t\" is too large");
+  if (!medium.homogeneous) requireTrackable(reader, medium);
   medium.phase = buildPhase(context, reader.child("phase"));
   reader.ignore("sample_emitters");
   reader.ignore("has_spectral_extinction");

@@ -113,8 +113,7 @@ void readFieldOfView(PluginReader& reader, PerspectiveCamera& camera) {
   const bool byLength = reader.has("focal_length");
   if (byLength && reader.has("fov")) reader.fail("fov", "give either \"fov\" or \"focal_length\", not both");
   const auto axis = static_cast<FovAxis>(reader.oneOf("fov_axis", "x", kFovAxes));
-  if (byLength) return setFieldOfView(camera, fovOfFocalLength(reader), FovAxis::diagonal);
-  if (!reader.has("fov")) reader.failHere("a perspective sensor needs \"fov\" or \"focal_length\"");
+  if (byLength || !reader.has("fov")) return setFieldOfView(camera, fovOfFocalLength(reader), FovAxis::diagonal);
   setFieldOfView(camera, reader.number("fov", 0, {.lo = 0, .hi = 180, .openLo = true, .openHi = true}), axis);
 }
 
@@ -167,7 +166,7 @@ void buildIntegrator(BuildContext& context, const Node& integrator) {
   IntegratorHints& hints = context.scene.integrator;
   hints.maxDepth = reader.integer("max_depth", hints.maxDepth, {.lo = -1});
   hints.rrDepth = reader.integer("rr_depth", hints.rrDepth, {.lo = 1});
-  reader.ignore("hide_emitters");
+  if (reader.boolean("hide_emitters", false)) reader.fail("hide_emitters", "\"hide_emitters\" is not supported yet");
   reader.ignore("strict_normals");
   reader.finish();
 }

@@ -71,9 +71,25 @@ void warnOfOverlaps(BuildContext& context) {
   std::vector<Bounds> boxes;
   for (size_t i = 0; i < context.parts.boundaries.size(); ++i)
     if (!context.parts.boundaries[i].replaces) boxes.push_back(context.parts.boundaryShapes[i]->bounds);
-  if (deepestOverlap(boxes, MediaState::kCapacity + 1) > MediaState::kCapacity)
+  constexpr size_t kFew = 64;  // the search is of the fourth power; scenes of more volumes go without this warning
+  if (boxes.size() <= kFew && deepestOverlap(boxes, MediaState::kCapacity + 1) > MediaState::kCapacity)
     context.diagnostics.warnings.push_back(fmt::format(
         "warning: more than {0} volumes may overlap; where more than {0} do, the others are left out", MediaState::kCapacity));
+}
+
+// What makes a picture black, or leaves light out, without being an error.
+void warnOfDarkness(BuildContext& context) {
+  const Scene::Parts& parts = context.parts;
+  if (!(parts.emitterChoice.total() > 0))
+    context.diagnostics.warnings.push_back("warning: the scene has no emitter that shines: its picture is black");
+  const bool points = std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
+  const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
+    return parts.bsdfs[static_cast<size_t>(s.bsdf)].front.transmits();
+  });
+  if (points && glass)
+    context.diagnostics.warnings.push_back(
+        "warning: light of point, spot and directional emitters through smooth glass cannot be found by path: "
+        "caustic_* layers lack it; give such lamps a small area");
 }
 
 NodePtr onlyChild(PluginReader& reader, std::string_view tag) {
@@ -138,6 +154,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   // Definitions for others to refer to; checked even where nobody does.
   for (const NodePtr& bsdf : reader.children("bsdf")) buildBsdf(context, *bsdf);
   for (const NodePtr& medium : reader.children("medium")) buildMedium(context, *medium);
+  for (const char* tag : {"phase", "volume", "film", "rfilter", "sampler"}) reader.ignoreChildren(tag);
   const NodePtr sensor = onlyChild(reader, "sensor");
   if (!sensor) reader.failHere("the scene has no sensor", "add a <sensor type=\"perspective\">");
   buildSensor(context, *sensor);
@@ -148,6 +165,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   warnOfOverlaps(context);
   chooseEmittersByPower(context);
   linkViews(*scene, *parts);
+  warnOfDarkness(context);
   const int declared = scene->view.cameraMedia.base();
   scene->view.cameraMedia = mediaAt(*scene, scene->camera.toWorld.translation);
   if (declared != MediaState::kNone) scene->view.cameraMedia.setBase(declared);

@@ -71,7 +71,7 @@ class MediaState {
     for (int i = 0; i < count_; ++i)
       if (inside_[i].boundary == boundary) return;
     if (count_ < kCapacity)
-      inside_[count_++] = {static_cast<int16_t>(boundary), static_cast<int16_t>(medium)};
+      inside_[count_++] = {boundary, medium};
     else
       overflowed_ = true;
   }
@@ -100,7 +100,7 @@ class MediaState {
 
  private:
   struct Inside {
-    int16_t boundary, medium;
+    int32_t boundary, medium;
   };
 
   // A base medium that is the interior of a boundary we are in was declared twice (a camera inside a cloud that names the

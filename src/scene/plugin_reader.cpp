@@ -132,6 +132,9 @@ Matrix4 PluginReader::transform(std::string_view name) {
   const auto* m = std::get_if<Matrix4>(&p->value);
   if (!m) fail(name, fmt::format("\"{}\" must be a transform, not a {}", name, typeName(p->value)));
   if (!m->isFinite()) fail(name, fmt::format("the transform \"{}\" is not finite", name));
+  const Affine single(*m);
+  if (!isFinite(single.x) || !isFinite(single.y) || !isFinite(single.z) || !isFinite(single.translation))
+    fail(name, fmt::format("the transform \"{}\" is too large", name));
   if (!m->isAffine()) fail(name, fmt::format("the transform \"{}\" is a projection; its last row must be 0 0 0 1", name));
   if (m->isSingular()) fail(name, fmt::format("the transform \"{}\" is singular: it flattens space", name));
   return *m;

@@ -70,7 +70,7 @@ TEST(Builder, EveryPluginHasDefaults) {
   for (const char* phase : {"isotropic", "hg", "cornette_shanks"})
     EXPECT_NO_THROW(test::build(
         boundary(fmt::format("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"{}\"/></medium>", phase))));
-  const SceneSnapshot scene = test::build("<integrator type=\"volpath\"/>");
+  const SceneSnapshot scene = test::build("<integrator type=\"volpath\"/><emitter type=\"constant\"/>");
   EXPECT_EQ(scene->camera.filmWidth, 768);
   EXPECT_EQ(scene->camera.filmHeight, 576);
   EXPECT_EQ(scene->filter.kind, PixelFilter::Kind::gaussian);
@@ -127,7 +127,7 @@ TEST(Builder, UnknownParametersAreNamedWithWhatIsThere) {
 TEST(Builder, LenientTurnsUnknownParametersIntoWarnings) {
   const SceneDescription d =
       test::describe(std::string("<shape type=\"sphere\"><float name=\"radios\" value=\"1\"/><string name=\"colour\" "
-                                 "value=\"red\"/></shape>") +
+                                 "value=\"red\"/></shape><emitter type=\"constant\"/>") +
                      test::kSensor);
   const SceneSnapshot scene = buildScene(d, {.filmSize = {}, .lenient = true});
   ASSERT_EQ(scene->warnings.size(), 2u);
@@ -172,8 +172,6 @@ TEST(Builder, Films) {
   expectError(film("<integer name=\"height\" value=\"[[-5]]\"/>"), "\"height\" is -5; it must be in [1, 65536]");
   expectError(film("<integer name=\"width\" value=\"100\"/><integer name=\"crop_width\" value=\"[[101]]\"/>"),
               "the crop window leaves the film, which is 100 pixels wide");
-  expectError("<sensor type=\"[[perspective]]\"><film type=\"hdrfilm\"/></sensor>",
-              "a perspective sensor needs \"fov\" or \"focal_length\"");
   expectError("<sensor type=\"perspective\"><float name=\"fov\" value=\"[[180]]\"/></sensor>",
               "\"fov\" is 180; it must be in (0, 180)");
   expectError(
@@ -284,9 +282,31 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
       std::string::npos);
 }
 
+TEST(Builder, WhatMakesAPictureBlackIsWarnedOf) {
+  EXPECT_EQ(test::build("<shape type=\"sphere\"/>")->warnings,
+            std::vector<std::string>{"warning: the scene has no emitter that shines: its picture is black"});
+  EXPECT_EQ(test::build("<emitter type=\"point\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")->warnings.size(), 1u);
+  EXPECT_TRUE(test::build("<emitter type=\"constant\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")->warnings.empty());
+}
+
+TEST(Builder, ObjectsThatAreOnlyReferredToMayStandAnywhere) {
+  const SceneSnapshot scene = test::build(
+      "<emitter type=\"area\" id=\"glow\"/><phase type=\"hg\" id=\"forward\"><float name=\"g\" value=\"0.5\"/></phase>"
+      "<shape type=\"sphere\"><ref id=\"glow\"/></shape><shape type=\"cube\"><bsdf type=\"null\"/><medium name=\"interior\" "
+      "type=\"homogeneous\"><ref id=\"forward\"/></medium></shape>");
+  EXPECT_EQ(scene->view.emitters.size, 1);
+  EXPECT_EQ(scene->view.media[0].phase.g(), 0.5f);
+}
+
+TEST(Builder, ASensorWithoutAngleHasTheLensOf50Millimetres) {
+  const SceneSnapshot scene = buildScene(test::describe("<sensor type=\"perspective\"/><emitter type=\"constant\"/>"));
+  const float diagonal = std::sqrt(square(scene->camera.tanX) + square(scene->camera.tanY));
+  EXPECT_NEAR(diagonal, std::sqrt(36.f * 36 + 24 * 24) / 100, 1e-5f);
+}
+
 TEST(Builder, ManyOverlappingVolumesAreWarnedOf) {
   const auto boxes = [](int count, float step) {
-    std::string text;
+    std::string text = "<emitter type=\"constant\"/>";
     for (int i = 0; i < count; ++i)
       text += fmt::format(
           "<shape type=\"cube\"><bsdf type=\"null\"/>{}<transform name=\"to_world\"><translate x=\"{}\" y=\"{}\" "
