@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a path spends its time on in a plume: grid lookups, free flights, transmittances, random numbers.
+#include "transport/tracking.h"
+
 #include <benchmark/benchmark.h>
 
 #include "core/sampler.h"
 #include "core/warp.h"
-#include "transport/tracking.h"
 #include "volume/grid.h"
 #include "volume/procedural.h"
 
@@ -39,7 +40,8 @@ void lookupAlongRays(benchmark::State& state) {
   float sum = 0;
   for (auto _ : state) {
     const Ray ray = rayThroughCube(random);
-    for (int i = 0; i < 64; ++i) sum += dense.lookup(plume.medium.worldToDensity.point(ray.at(1.5f + static_cast<float>(i) / 64)));
+    for (int i = 0; i < 64; ++i)
+      sum += dense.lookup(plume.medium.worldToDensity.point(ray.at(1.5f + static_cast<float>(i) / 64)));
   }
   benchmark::DoNotOptimize(sum);
   state.SetItemsProcessed(state.iterations() * 64);
@@ -57,7 +59,8 @@ BENCHMARK(freeFlight)->Arg(2)->Arg(4)->Arg(8)->Arg(16);
 void transmittance(benchmark::State& state) {
   const Plume plume(static_cast<int>(state.range(0)));
   Pcg32 random(1);
-  for (auto _ : state) benchmark::DoNotOptimize(estimateTransmittance(plume.medium, rayThroughCube(random), 0, 4, random));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(estimateTransmittance(plume.medium, rayThroughCube(random), 0, 4, random));
   state.SetItemsProcessed(state.iterations());
 }
 BENCHMARK(transmittance)->Arg(2)->Arg(4)->Arg(8)->Arg(16);

@@ -45,8 +45,8 @@ class Error : public std::runtime_error {
 
   const std::string& message() const { return message_; }
   const Details& details() const { return details_; }
-  /// The same complaint, placed at `position` unless it has a place already. For errors that rise from a loader of files
-  /// (which knows only its file) through the description that named the file.
+  /// The same complaint, placed at `position` unless it has a place already. For errors that rise from a loader of
+  /// files (which knows only its file) through the description that named the file.
   Error at(const SourcePosition& position) const;
 
  private:

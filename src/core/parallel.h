@@ -10,7 +10,8 @@
 
 namespace virga {
 
-/// Calls body(i) for i in [0, n), in any order, on all threads that the caller's arena has. `grain` items go to one task.
+/// Calls body(i) for i in [0, n), in any order, on all threads that the caller's arena has. `grain` items go to one
+/// task.
 template <class Body>
 void parallelFor(int64_t n, int64_t grain, const Body& body) {
   tbb::parallel_for(tbb::blocked_range<int64_t>(0, n, grain), [&](const tbb::blocked_range<int64_t>& range) {
@@ -18,8 +19,8 @@ void parallelFor(int64_t n, int64_t grain, const Body& body) {
   });
 }
 
-/// Sum (or any fold) of value(i) over [0, n): the same result for every number of threads, because the blocks are fixed and
-/// are combined in order. `combine(a, b)` need not commute.
+/// Sum (or any fold) of value(i) over [0, n): the same result for every number of threads, because the blocks are fixed
+/// and are combined in order. `combine(a, b)` need not commute.
 template <class T, class Value, class Combine>
 T deterministicReduce(int64_t n, T identity, const Value& value, const Combine& combine) {
   constexpr int64_t kBlock = 4096;

@@ -17,7 +17,9 @@ VIRGA_HD constexpr uint32_t hash32(uint32_t x) {
   return x;
 }
 
-VIRGA_HD constexpr uint32_t hashCombine(uint32_t seed, uint32_t value) { return hash32(seed ^ (hash32(value) + 0x9e3779b9u)); }
+VIRGA_HD constexpr uint32_t hashCombine(uint32_t seed, uint32_t value) {
+  return hash32(seed ^ (hash32(value) + 0x9e3779b9u));
+}
 
 /// splitmix64's finaliser: 64 bits to 64 bits.
 VIRGA_HD constexpr uint64_t hash64(uint64_t x) {

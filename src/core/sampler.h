@@ -14,8 +14,8 @@ VIRGA_HD constexpr uint32_t reverseBits(uint32_t x) {
   return (x >> 16) | (x << 16);
 }
 
-/// A hash in which every bit depends on lower bits only (Laine and Karras 2011; constants of N. Vegdahl): Owen scrambling of a
-/// binary fraction whose bits stand in reverse.
+/// A hash in which every bit depends on lower bits only (Laine and Karras 2011; constants of N. Vegdahl): Owen
+/// scrambling of a binary fraction whose bits stand in reverse.
 VIRGA_HD constexpr uint32_t scrambleReversed(uint32_t x, uint32_t seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
@@ -30,9 +30,9 @@ VIRGA_HD constexpr uint32_t owenScramble(uint32_t fraction, uint32_t seed) {
   return reverseBits(scrambleReversed(reverseBits(fraction), seed));
 }
 
-/// Second dimension of Sobol's sequence (primitive polynomial x + 1), its bits in reverse. The generator matrix is Pascal's
-/// triangle modulo 2, and a binomial coefficient (i over j) is odd where the bits of j are a subset of those of i (Lucas): so the
-/// product is a sum over supersets, bit by bit of the bits' numbers.
+/// Second dimension of Sobol's sequence (primitive polynomial x + 1), its bits in reverse. The generator matrix is
+/// Pascal's triangle modulo 2, and a binomial coefficient (i over j) is odd where the bits of j are a subset of those
+/// of i (Lucas): so the product is a sum over supersets, bit by bit of the bits' numbers.
 VIRGA_HD constexpr uint32_t sobolSecondReversed(uint32_t index) {
   index ^= (index >> 1) & 0x55555555u;
   index ^= (index >> 2) & 0x33333333u;
@@ -51,9 +51,9 @@ struct SampleId {
   uint32_t index;      ///< of the sample within (replicate, stream): position in the low-discrepancy sequence
 };
 
-/// Random numbers of one sample. next1D and next2D come from Owen-scrambled Sobol points, two dimensions at a time, each pair
-/// with an order and a scramble of its own ("padding": no bad projections, however many dimensions are used). random() is an
-/// independent stream for what has no fixed dimension (tracking, deep bounces).
+/// Random numbers of one sample. next1D and next2D come from Owen-scrambled Sobol points, two dimensions at a time,
+/// each pair with an order and a scramble of its own ("padding": no bad projections, however many dimensions are used).
+/// random() is an independent stream for what has no fixed dimension (tracking, deep bounces).
 class Sampler {
  public:
   VIRGA_HD explicit Sampler(const SampleId& id)
@@ -83,8 +83,8 @@ class Sampler {
   struct Pair {
     uint32_t index, seedX, seedY;
   };
-  // In the shuffled index a bit depends on higher bits only, so that an aligned block of indices becomes another aligned block
-  // and stays a (0,2)-net. (Were it the lower bits, the second coordinate would lose its strata.)
+  // In the shuffled index a bit depends on higher bits only, so that an aligned block of indices becomes another
+  // aligned block and stays a (0,2)-net. (Were it the lower bits, the second coordinate would lose its strata.)
   VIRGA_HD Pair nextPair() {
     const uint64_t h = hash64(stream_ + ++pair_ * kReplicateStride);
     const auto low = static_cast<uint32_t>(h), high = static_cast<uint32_t>(h >> 32);

@@ -32,8 +32,8 @@ VIRGA_HD inline Vec3 cosineHemisphere(Vec2 u) {
   return {d.x, d.y, std::sqrt(std::max(0.f, 1 - d.x * d.x - d.y * d.y))};
 }
 
-/// Uniform within the cone about +z with 1 - cos(half angle) = `height`; density 1 / (2 pi height) [1/sr]. Takes the height and
-/// not the cosine: for far lights the cosine rounds to 1.
+/// Uniform within the cone about +z with 1 - cos(half angle) = `height`; density 1 / (2 pi height) [1/sr]. Takes the
+/// height and not the cosine: for far lights the cosine rounds to 1.
 VIRGA_HD inline Vec3 uniformCone(Vec2 u, float height) {
   const float v = u.x * height;  // 1 - cos(theta)
   return sphericalDirection(std::sqrt(std::max(0.f, v * (2 - v))), 1 - v, kTwoPi * u.y);

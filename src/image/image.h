@@ -14,7 +14,8 @@ struct Image {
   std::vector<Rgb> pixels;  ///< width * height
 
   Image() = default;
-  Image(int w, int h, Rgb fill = {}) : width(w), height(h), pixels(static_cast<size_t>(w) * static_cast<size_t>(h), fill) {}
+  Image(int w, int h, Rgb fill = {})
+      : width(w), height(h), pixels(static_cast<size_t>(w) * static_cast<size_t>(h), fill) {}
 
   Rgb& at(int x, int y) { return pixels[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]; }
   const Rgb& at(int x, int y) const {

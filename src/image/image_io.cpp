@@ -9,9 +9,9 @@
 #include <memory>
 #include <system_error>
 
+#include "core/atomic_write.h"
 #include "core/error.h"
 #include "core/parallel.h"
-#include "core/atomic_write.h"
 #include "image/formats.h"
 
 namespace virga {

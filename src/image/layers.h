@@ -10,8 +10,8 @@
 namespace virga {
 
 /// Transport layers: every method's picture is split the same way, and the beauty is their sum.
-/// x1 is the first vertex from the eye that scatters, x2 the next one toward the light; perfectly specular vertices do not
-/// count. `mediaToSurface`: x1 on a surface, x2 in the medium (the light travels from the medium to the surface).
+/// x1 is the first vertex from the eye that scatters, x2 the next one toward the light; perfectly specular vertices do
+/// not count. `mediaToSurface`: x1 on a surface, x2 in the medium (the light travels from the medium to the surface).
 enum class Layer : uint8_t {
   emission,          ///< emitter or background seen directly, attenuated
   directSurface,     ///< x1 surface, x2 light

@@ -35,10 +35,11 @@ struct PassResult {
     replaced,  ///< a refined picture: takes the place of what was there
   };
   Kind kind = Kind::averaged;
-  bool completed = true;          ///< false: stopped on the way; the frame does not count
-  bool biased = false;            ///< expectation of the picture differs from the truth
-  bool converged = false;         ///< more passes change nothing
-  std::optional<double> residual = std::nullopt;  ///< where the method has one: an estimate of the relative distance to its fixed point
+  bool completed = true;   ///< false: stopped on the way; the frame does not count
+  bool biased = false;     ///< expectation of the picture differs from the truth
+  bool converged = false;  ///< more passes change nothing
+  std::optional<double> residual =
+      std::nullopt;  ///< where the method has one: an estimate of the relative distance to its fixed point
 };
 
 /// Things to draw over the picture: virtual lights, samples, particles.
@@ -66,15 +67,15 @@ class Method {
  public:
   virtual ~Method() = default;
 
-  /// Once, before anything else; may be slow. `layers` are those that the film stores besides the beauty. Throws Error for
-  /// settings it does not know or cannot take.
+  /// Once, before anything else; may be slow. `layers` are those that the film stores besides the beauty. Throws Error
+  /// for settings it does not know or cannot take.
   virtual void prepare(SceneSnapshot, const Settings&, LayerMask layers) = 0;
 
   /// The scene is `next` from now on; `changes` lists all that differs. Says what survives.
   virtual Reset update(SceneSnapshot next, const ChangeSet& changes) = 0;
 
-  /// Fills the whole frame with pass `index` (0, 1, ...; it belongs to replicate index % Film::kReplicates). Returns within 20 ms
-  /// of a stop request.
+  /// Fills the whole frame with pass `index` (0, 1, ...; it belongs to replicate index % Film::kReplicates). Returns
+  /// within 20 ms of a stop request.
   virtual PassResult pass(int64_t index, const Budget&, std::stop_token, PassFrame&) = 0;
 
   virtual Overlay overlay() const { return {}; }

@@ -23,7 +23,8 @@ const MethodInfo& findMethod(std::string_view name) {
     if (m.name == name) return m;
     names.emplace_back(m.name);
   }
-  throw Error(fmt::format("unknown method \"{}\"", name), {{}, didYouMean(name, names), {"available: " + joined(names)}});
+  throw Error(fmt::format("unknown method \"{}\"", name),
+              {{}, didYouMean(name, names), {"available: " + joined(names)}});
 }
 
 std::string_view accuracyName(Accuracy accuracy) {

@@ -9,7 +9,8 @@
 
 namespace virga {
 
-/// Reads a method's settings. Unknown names and values that are of the wrong kind or out of range throw Error with a remedy.
+/// Reads a method's settings. Unknown names and values that are of the wrong kind or out of range throw Error with a
+/// remedy.
 class SettingsReader {
  public:
   SettingsReader(const Settings& settings, std::span<const SettingInfo> known, std::string_view method);

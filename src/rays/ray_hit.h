@@ -26,7 +26,8 @@ struct Crossing {
   bool doubtful = false;  ///< on the edge of a triangle: rounding may have kept the ray from its neighbour
 };
 
-/// The nearest crossings of a ray, sorted by t; entries beyond the capacity are dropped from the far end, and `complete` tells.
+/// The nearest crossings of a ray, sorted by t; entries beyond the capacity are dropped from the far end, and
+/// `complete` tells.
 struct CrossingList {
   static constexpr int kCapacity = 32;
   Crossing items[kCapacity];

@@ -121,7 +121,8 @@ LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
       shape.analytic);
 }
 
-void gatherAnalytic(const RayShape::Impl& shape, uint32_t index, const Ray& ray, float tMin, float tMax, CrossingList& list) {
+void gatherAnalytic(const RayShape::Impl& shape, uint32_t index, const Ray& ray, float tMin, float tMax,
+                    CrossingList& list) {
   const LineHits hits = intersectAnalytic(shape, ray.o, ray.d);
   for (int i = 0; i < hits.count; ++i)
     if (hits.hit[i].t >= tMin && hits.hit[i].t <= tMax) list.insert({hits.hit[i].t, index, hits.hit[i].entering});
@@ -133,7 +134,8 @@ void boundsCallback(const RTCBoundsFunctionArguments* args) {
   const Bounds& b = implOf(args->geometryUserPtr).bounds;
   // Embree's boxes must hold the shape in spite of rounding in the traversal.
   const Vec3 pad = max(abs(b.lo), abs(b.hi)) * 1e-6f;
-  *args->bounds_o = {b.lo.x - pad.x, b.lo.y - pad.y, b.lo.z - pad.z, 0, b.hi.x + pad.x, b.hi.y + pad.y, b.hi.z + pad.z, 0};
+  *args->bounds_o = {b.lo.x - pad.x, b.lo.y - pad.y, b.lo.z - pad.z, 0,
+                     b.hi.x + pad.x, b.hi.y + pad.y, b.hi.z + pad.z, 0};
 }
 
 // Nearest of the shape's hits in the ray's open interval.

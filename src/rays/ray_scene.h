@@ -44,7 +44,8 @@ class RayScene {
   RayHit nearest(const Ray& ray, float tMin, float tMax) const;
   /// Anything with tMin < t < tMax?
   bool occluded(const Ray& ray, float tMin, float tMax) const;
-  /// All crossings with 0 <= tMin <= t <= tMax (those of triangles: tMin < t). The same ray finds them at the same t in every call.
+  /// All crossings with 0 <= tMin <= t <= tMax (those of triangles: tMin < t). The same ray finds them at the same t in
+  /// every call.
   void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const;
 
  private:

@@ -15,8 +15,8 @@ namespace virga {
 
 struct BsdfSample {
   Vec3 wi;
-  Rgb weight;             ///< value * |wi.z| / pdf; for a specular BSDF the whole reflectance or transmittance of the branch
-  float pdf = 0;          ///< [1/sr]; 0: no sample. For a specular BSDF the probability of the branch.
+  Rgb weight;     ///< value * |wi.z| / pdf; for a specular BSDF the whole reflectance or transmittance of the branch
+  float pdf = 0;  ///< [1/sr]; 0: no sample. For a specular BSDF the probability of the branch.
   bool specular = false;  ///< a Dirac delta: no other direction connects
   float eta = 1;          ///< relative index of refraction that the ray passed (for Russian roulette); 1 for reflection
 };
@@ -34,8 +34,8 @@ struct Diffuse {
   }
 };
 
-/// Modified Phong model (Lafortune and Willems 1994), one-sided: diffuse / pi + specular (n + 2) / (2 pi) cos^n(alpha), alpha
-/// the angle to the mirror direction. Energy is conserved where diffuse + specular <= 1.
+/// Modified Phong model (Lafortune and Willems 1994), one-sided: diffuse / pi + specular (n + 2) / (2 pi) cos^n(alpha),
+/// alpha the angle to the mirror direction. Energy is conserved where diffuse + specular <= 1.
 struct Phong {
   Rgb diffuse, specular;
   float exponent;
@@ -80,8 +80,8 @@ struct Conductor {
   }
 };
 
-/// Smooth interface between two dielectrics; the normal points outside. Radiance that is refracted scales with the square of
-/// the relative index (light walks use the adjoint, without that factor).
+/// Smooth interface between two dielectrics; the normal points outside. Radiance that is refracted scales with the
+/// square of the relative index (light walks use the adjoint, without that factor).
 struct Dielectric {
   float eta;  ///< inside over outside index
   Rgb reflectance, transmittance;
@@ -95,8 +95,8 @@ struct Dielectric {
   }
 };
 
-/// Any of the above as a tagged value; `null` surfaces are not here: nothing scatters on them. A new BSDF is a struct with value,
-/// pdf and sample (or sample alone, if it is specular), a Kind, a constructor and a line in visit().
+/// Any of the above as a tagged value; `null` surfaces are not here: nothing scatters on them. A new BSDF is a struct
+/// with value, pdf and sample (or sample alone, if it is specular), a Kind, a constructor and a line in visit().
 class Bsdf {
  public:
   enum class Kind : uint8_t { diffuse, phong, conductor, dielectric };
@@ -124,10 +124,14 @@ class Bsdf {
   }
   VIRGA_HD BsdfSample sample(Vec3 wo, Vec2 u, float choice) const {
     switch (kind_) {
-      case Kind::phong: return phong_.sample(wo, u, choice);
-      case Kind::conductor: return conductor_.sample(wo, u, choice);
-      case Kind::dielectric: return dielectric_.sample(wo, u, choice);
-      default: return diffuse_.sample(wo, u, choice);
+      case Kind::phong:
+        return phong_.sample(wo, u, choice);
+      case Kind::conductor:
+        return conductor_.sample(wo, u, choice);
+      case Kind::dielectric:
+        return dielectric_.sample(wo, u, choice);
+      default:
+        return diffuse_.sample(wo, u, choice);
     }
   }
 

@@ -11,7 +11,8 @@ struct DielectricFresnel {
   float eta;             ///< index of the far side over the index of the side the ray is on
 };
 
-/// Unpolarised reflectance at a smooth interface. cosIncident is signed: > 0 on the outside; eta = inside over outside index.
+/// Unpolarised reflectance at a smooth interface. cosIncident is signed: > 0 on the outside; eta = inside over outside
+/// index.
 VIRGA_HD inline DielectricFresnel fresnelDielectric(float cosIncident, float eta) {
   const float relative = cosIncident >= 0 ? eta : 1 / eta;
   const float ci = std::fabs(cosIncident);
@@ -24,7 +25,8 @@ VIRGA_HD inline DielectricFresnel fresnelDielectric(float cosIncident, float eta
   return {0.5f * (parallel * parallel + perpendicular * perpendicular), ct, relative};
 }
 
-/// Unpolarised reflectance of a conductor with refractive index eta + i k (relative to the outside), cosIncident in [0, 1].
+/// Unpolarised reflectance of a conductor with refractive index eta + i k (relative to the outside), cosIncident in [0,
+/// 1].
 VIRGA_HD inline float fresnelConductor(float cosIncident, float eta, float k) {
   const float c2 = cosIncident * cosIncident, s2 = 1 - c2;
   const float e2 = eta * eta - k * k - s2;

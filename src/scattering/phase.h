@@ -28,7 +28,8 @@ struct HenyeyGreenstein {
   float g;
 
   VIRGA_HD float value(Vec3 wo, Vec3 wi) const {
-    // Half the squared distance of unit vectors is 1 - cos(angle), and keeps its digits where 1 + dot(wo, wi) is rounding error.
+    // Half the squared distance of unit vectors is 1 - cos(angle), and keeps its digits where 1 + dot(wo, wi) is
+    // rounding error.
     return atHeight(0.5f * lengthSquared(g < 0 ? wi - wo : wi + wo));
   }
   VIRGA_HD float pdf(Vec3 wo, Vec3 wi) const { return value(wo, wi); }
@@ -44,8 +45,8 @@ struct HenyeyGreenstein {
   }
 
  private:
-  // v = 1 - cos(angle to the peak). The peak lies ahead for g > 0 and behind for g < 0, of the same shape: taken from the peak,
-  // 1 + g^2 - 2 g cos(theta) = (1 - |g|)^2 + 2 |g| v does not cancel for either sign.
+  // v = 1 - cos(angle to the peak). The peak lies ahead for g > 0 and behind for g < 0, of the same shape: taken from
+  // the peak, 1 + g^2 - 2 g cos(theta) = (1 - |g|)^2 + 2 |g| v does not cancel for either sign.
   VIRGA_HD float atHeight(float v) const {
     const float a = std::fabs(g), d = square(1 - a) + 2 * a * v;
     return kInv4Pi * (1 - a * a) / (d * std::sqrt(d));
@@ -67,7 +68,8 @@ struct CornetteShanks {
   }
 };
 
-/// Any of the above, as a tagged value. A new phase function is a struct with value, pdf and sample, a Kind, and a line here.
+/// Any of the above, as a tagged value. A new phase function is a struct with value, pdf and sample, a Kind, and a line
+/// here.
 class PhaseFunction {
  public:
   enum class Kind : uint8_t { isotropic, henyeyGreenstein, cornetteShanks };
@@ -76,9 +78,12 @@ class PhaseFunction {
   template <class F>
   VIRGA_HD auto visit(F&& f) const {
     switch (kind_) {
-      case Kind::henyeyGreenstein: return f(HenyeyGreenstein{g_});
-      case Kind::cornetteShanks: return f(CornetteShanks{g_});
-      default: return f(Isotropic{});
+      case Kind::henyeyGreenstein:
+        return f(HenyeyGreenstein{g_});
+      case Kind::cornetteShanks:
+        return f(CornetteShanks{g_});
+      default:
+        return f(Isotropic{});
     }
   }
 

@@ -6,18 +6,31 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kNotYet[] = {"roughconductor", "thindielectric", "roughdielectric", "plastic", "roughplastic",
-                                        "principled",     "mask",           "bumpmap",         "normalmap", "blendbsdf"};
+constexpr std::string_view kNotYet[] = {
+    "roughconductor", "thindielectric", "roughdielectric", "plastic",   "roughplastic",
+    "principled",     "mask",           "bumpmap",         "normalmap", "blendbsdf"};
 
 struct NamedIndex {
   std::string_view name;
   float ior;
 };
 // Refractive indices at 589 nm, from the usual tables.
-constexpr NamedIndex kIndices[] = {{"vacuum", 1.f},         {"air", 1.000277f},      {"helium", 1.000036f},  {"water ice", 1.31f},
-                                   {"water", 1.3330f},      {"acetone", 1.36f},      {"ethanol", 1.361f},    {"fused quartz", 1.458f},
-                                   {"pyrex", 1.470f},       {"acrylic glass", 1.49f}, {"benzene", 1.501f},   {"bk7", 1.5046f},
-                                   {"sodium chloride", 1.544f}, {"amber", 1.55f},    {"pet", 1.5750f},       {"diamond", 2.419f}};
+constexpr NamedIndex kIndices[] = {{"vacuum", 1.f},
+                                   {"air", 1.000277f},
+                                   {"helium", 1.000036f},
+                                   {"water ice", 1.31f},
+                                   {"water", 1.3330f},
+                                   {"acetone", 1.36f},
+                                   {"ethanol", 1.361f},
+                                   {"fused quartz", 1.458f},
+                                   {"pyrex", 1.470f},
+                                   {"acrylic glass", 1.49f},
+                                   {"benzene", 1.501f},
+                                   {"bk7", 1.5046f},
+                                   {"sodium chloride", 1.544f},
+                                   {"amber", 1.55f},
+                                   {"pet", 1.5750f},
+                                   {"diamond", 2.419f}};
 
 struct NamedMetal {
   std::string_view name;
@@ -61,7 +74,8 @@ Bsdf buildPhong(PluginReader& reader) {
 Bsdf buildConductor(PluginReader& reader) {
   NamedMetal metal = kMetals[1];
   const bool byNumbers = reader.has("eta") || reader.has("k");
-  if (byNumbers && reader.has("material")) reader.fail("material", "give either \"material\" or \"eta\" and \"k\", not both");
+  if (byNumbers && reader.has("material"))
+    reader.fail("material", "give either \"material\" or \"eta\" and \"k\", not both");
   if (!byNumbers) metal = kMetals[reader.oneOf("material", "Cu", names(kMetals))];
   const Rgb eta = reader.color("eta", metal.eta), k = reader.color("k", metal.k);
   const float outside = refractiveIndex(reader, "ext_eta", "air");
@@ -75,9 +89,9 @@ Bsdf buildDielectric(PluginReader& reader) {
 }
 
 using Build = Bsdf (*)(PluginReader&);
-constexpr PluginRow<Build> kBsdfs[] = {
-    {"diffuse", buildDiffuse}, {"phong", buildPhong}, {"conductor", buildConductor}, {"dielectric", buildDielectric},
-    {"twosided", nullptr},     {"null", nullptr}};
+constexpr PluginRow<Build> kBsdfs[] = {{"diffuse", buildDiffuse},     {"phong", buildPhong},
+                                       {"conductor", buildConductor}, {"dielectric", buildDielectric},
+                                       {"twosided", nullptr},         {"null", nullptr}};
 
 Bsdf buildOneSided(BuildContext& context, const Node& node) {
   const Build build = findPlugin(node, kBsdfs, kNotYet);
@@ -94,7 +108,8 @@ SurfaceBsdf buildTwoSided(BuildContext& context, const Node& node) {
   reader.finish();
   if (sides.empty() || sides.size() > 2) reader.failHere("a twosided bsdf holds one or two others");
   const SurfaceBsdf result{buildOneSided(context, *sides.front()), buildOneSided(context, *sides.back()), true};
-  if (result.front.transmits() || result.back.transmits()) reader.failHere("only bsdfs that reflect can be made twosided");
+  if (result.front.transmits() || result.back.transmits())
+    reader.failHere("only bsdfs that reflect can be made twosided");
   return result;
 }
 

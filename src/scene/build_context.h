@@ -28,8 +28,8 @@ struct BuildContext {
 
   /// The object of that key: from this scene's cache, the previous scene's, or made now.
   template <class T>
-  std::shared_ptr<const T> cached(std::map<std::string, std::shared_ptr<const T>> PartCache::*map, const std::string& key,
-                                  const std::function<std::shared_ptr<const T>()>& make) {
+  std::shared_ptr<const T> cached(std::map<std::string, std::shared_ptr<const T>> PartCache::*map,
+                                  const std::string& key, const std::function<std::shared_ptr<const T>()>& make) {
     std::shared_ptr<const T>& slot = (parts.cache.*map)[key];
     if (!slot && previous)
       if (const auto old = (previous->*map).find(key); old != (previous->*map).end()) slot = old->second;
@@ -67,8 +67,8 @@ std::string fileKey(const std::filesystem::path& path);
 
 void buildSensor(BuildContext&, const Node& sensor);
 void buildIntegrator(BuildContext&, const Node& integrator);
-int buildBsdf(BuildContext&, const Node& bsdf);        ///< index into parts.bsdfs
-int buildMedium(BuildContext&, const Node& medium);    ///< index into parts.media
+int buildBsdf(BuildContext&, const Node& bsdf);      ///< index into parts.bsdfs
+int buildMedium(BuildContext&, const Node& medium);  ///< index into parts.media
 void buildShape(BuildContext&, const Node& shape);
 void buildEmitter(BuildContext&, const Node& emitter);
 void addAreaEmitter(BuildContext&, const Node& emitter, int surface, const BuiltShape&);

@@ -18,8 +18,10 @@ Vec3 unitDirection(PluginReader& reader, std::string_view parameter, Vec3 v) {
 EmitterView buildPoint(BuildContext&, PluginReader& reader) {
   EmitterView e;
   e.kind = EmitterView::Kind::point;
-  if (reader.has("position") && reader.has("to_world")) reader.fail("position", "give either \"position\" or \"to_world\"");
-  e.position = reader.has("position") ? reader.vector("position", {}) : Affine(reader.transform("to_world")).translation;
+  if (reader.has("position") && reader.has("to_world"))
+    reader.fail("position", "give either \"position\" or \"to_world\"");
+  e.position =
+      reader.has("position") ? reader.vector("position", {}) : Affine(reader.transform("to_world")).translation;
   e.value = reader.color("intensity", Rgb(1.f));
   return e;
 }
@@ -92,8 +94,9 @@ void checkRadiance(const Image& image) {
     if (!isFinite(image.pixels[i]) || minComponent(image.pixels[i]) < 0) ++bad, first = i;
   const auto width = static_cast<size_t>(image.width);
   if (bad > 0)
-    throw Error(fmt::format("the picture has {} pixels that are negative, infinite or not a number, the first at ({}, {})",
-                            bad, first % width, first / width));
+    throw Error(
+        fmt::format("the picture has {} pixels that are negative, infinite or not a number, the first at ({}, {})", bad,
+                    first % width, first / width));
 }
 
 std::shared_ptr<const BuiltEnvironment> loadEnvironment(const std::filesystem::path& path) {
@@ -108,7 +111,8 @@ EmitterView buildEnvironment(BuildContext& context, PluginReader& reader) {
   const std::filesystem::path path = context.file(reader, "filename");
   std::shared_ptr<const BuiltEnvironment> built;
   try {
-    built = context.cached<BuiltEnvironment>(&PartCache::environments, fileKey(path), [&] { return loadEnvironment(path); });
+    built = context.cached<BuiltEnvironment>(&PartCache::environments, fileKey(path),
+                                             [&] { return loadEnvironment(path); });
   } catch (const Error& error) {
     throw error.at(reader.positionOf("filename"));
   }
@@ -116,11 +120,14 @@ EmitterView buildEnvironment(BuildContext& context, PluginReader& reader) {
   e.kind = EmitterView::Kind::environment;
   const Matrix4 toWorld = reader.transform("to_world");
   EnvironmentView& view = e.environment;
-  view = {built->image.pixels.data(), built->image.width, built->image.height, built->rows.view(), built->columns.data(),
-          Affine(toWorld), Affine(toWorld.inverse()), reader.number("scale", 1, reader.nonNegative())};
+  view = {built->image.pixels.data(), built->image.width,
+          built->image.height,        built->rows.view(),
+          built->columns.data(),      Affine(toWorld),
+          Affine(toWorld.inverse()),  reader.number("scale", 1, reader.nonNegative())};
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < i; ++j) {
-      const Vec3 a = view.toWorld.vector(Vec3(i == 0, i == 1, i == 2)), b = view.toWorld.vector(Vec3(j == 0, j == 1, j == 2));
+      const Vec3 a = view.toWorld.vector(Vec3(i == 0, i == 1, i == 2)),
+                 b = view.toWorld.vector(Vec3(j == 0, j == 1, j == 2));
       if (std::fabs(dot(a, b)) > 1e-4f || std::fabs(lengthSquared(a) - 1) > 1e-3f)
         reader.fail("to_world", "an environment map's transform must be a rotation");
     }
@@ -133,11 +140,16 @@ EmitterView buildEnvironment(BuildContext& context, PluginReader& reader) {
 float power(const EmitterView& e, float sceneRadius) {
   const float section = kPi * sceneRadius * sceneRadius, v = luminance(e.value);
   switch (e.kind) {
-    case EmitterView::Kind::point: return 4 * kPi * v;
-    case EmitterView::Kind::spot: return kTwoPi * v * (1 - 0.5f * (std::cos(e.cutoffAngle) + std::cos(e.beamWidth)));
-    case EmitterView::Kind::directional: return v * section;
-    case EmitterView::Kind::area: return kPi * v * e.area;
-    default: return 4 * kPi * v * section;
+    case EmitterView::Kind::point:
+      return 4 * kPi * v;
+    case EmitterView::Kind::spot:
+      return kTwoPi * v * (1 - 0.5f * (std::cos(e.cutoffAngle) + std::cos(e.beamWidth)));
+    case EmitterView::Kind::directional:
+      return v * section;
+    case EmitterView::Kind::area:
+      return kPi * v * e.area;
+    default:
+      return 4 * kPi * v * section;
   }
 }
 
@@ -145,9 +157,9 @@ float power(const EmitterView& e, float sceneRadius) {
 
 void buildEmitter(BuildContext& context, const Node& node) {
   using Build = EmitterView (*)(BuildContext&, PluginReader&);
-  static constexpr PluginRow<Build> kEmitters[] = {{"point", buildPoint},       {"spot", buildSpot},
-                                                   {"directional", buildDirectional}, {"constant", buildConstant},
-                                                   {"envmap", buildEnvironment}, {"area", nullptr}};
+  static constexpr PluginRow<Build> kEmitters[] = {
+      {"point", buildPoint},       {"spot", buildSpot},          {"directional", buildDirectional},
+      {"constant", buildConstant}, {"envmap", buildEnvironment}, {"area", nullptr}};
   const Build build = findPlugin(node, kEmitters, kNotYet);
   PluginReader reader(node, context.diagnostics);
   if (!build && !node.hasGeneratedId()) return;  // a definition for shapes to refer to, which check it
@@ -156,7 +168,8 @@ void buildEmitter(BuildContext& context, const Node& node) {
   reader.ignore("sampling_weight");
   reader.finish();
   if (emitter.kind == EmitterView::Kind::constant || emitter.kind == EmitterView::Kind::environment) {
-    if (context.scene.view.environment >= 0) reader.failHere("the scene has a second environment", "keep one constant or envmap emitter");
+    if (context.scene.view.environment >= 0)
+      reader.failHere("the scene has a second environment", "keep one constant or envmap emitter");
     context.scene.view.environment = static_cast<int>(context.parts.emitters.size());
   }
   context.parts.emitters.push_back(emitter);

@@ -74,8 +74,8 @@ VolumeField buildGridVolume(BuildContext& context, PluginReader& reader, VolumeU
   VolumeField field;
   field.indexToWorld = reader.transform("to_world");
   if (reader.boolean("use_grid_bbox", false))
-    field.indexToWorld = field.indexToWorld *
-                         unitCubeToBounds(loadedFrom(reader, "filename", [&] { return volBounds(path); }));
+    field.indexToWorld =
+        field.indexToWorld * unitCubeToBounds(loadedFrom(reader, "filename", [&] { return volBounds(path); }));
   const std::string key = fileKey(path);
   loadedFrom(reader, "filename", [&] {
     if (use == VolumeUse::density) {
@@ -98,7 +98,8 @@ VolumeField buildVdb(BuildContext& context, PluginReader& reader, VolumeUse use)
   const std::string grid = reader.text("grid", "");
   VolumeField field;
   field.grid = loadedFrom(reader, reader.has("grid") ? "grid" : "filename", [&] {
-    return context.cached<Grid>(&PartCache::grids, fileKey(path) + "#" + grid, [&] { return loadVolume(path, {grid}); });
+    return context.cached<Grid>(&PartCache::grids, fileKey(path) + "#" + grid,
+                                [&] { return loadVolume(path, {grid}); });
   });
   field.indexToWorld = reader.transform("to_world") * field.grid->indexToWorld();
   return field;
@@ -117,14 +118,17 @@ VolumeField buildVolume(BuildContext& context, const Node& node, VolumeUse use) 
 
 float greySigmaT(PluginReader& reader, std::string_view parameter, Rgb value) {
   if (!isGrey(value))
-    reader.fail(parameter, fmt::format("\"{}\" differs between the channels; chromatic extinction is not supported yet", parameter),
-                "give one value");
+    reader.fail(
+        parameter,
+        fmt::format("\"{}\" differs between the channels; chromatic extinction is not supported yet", parameter),
+        "give one value");
   return value.r;
 }
 
 // Mitsuba 0.x names both coefficients; 3 names their sum and the albedo.
 void readScatteringAndAbsorption(PluginReader& reader, MediumView& medium) {
-  const Rgb sigmaS = reader.color("sigma_s", Rgb(0.f)), sigmaA = reader.color("sigma_a", Rgb(0.f)), sum = sigmaS + sigmaA;
+  const Rgb sigmaS = reader.color("sigma_s", Rgb(0.f)), sigmaA = reader.color("sigma_a", Rgb(0.f)),
+            sum = sigmaS + sigmaA;
   medium.sigmaT = greySigmaT(reader, "sigma_s", sum);
   medium.albedo = medium.sigmaT > 0 ? sigmaS / sum : Rgb(0.f);
 }
@@ -133,11 +137,13 @@ void readAlbedo(BuildContext& context, PluginReader& reader, MediumView& medium)
   if (const NodePtr volume = reader.child("volume", "albedo")) {
     const VolumeField field = buildVolume(context, *volume, VolumeUse::albedo);
     if (field.rgbGrid) {
-      if (field.rgbGrid->maximum() > 1) reader.fail("albedo", fmt::format("albedo reaches {}; it must be at most 1", field.rgbGrid->maximum()));
+      if (field.rgbGrid->maximum() > 1)
+        reader.fail("albedo", fmt::format("albedo reaches {}; it must be at most 1", field.rgbGrid->maximum()));
       medium.albedoGrid = field.rgbGrid->view();
       medium.worldToAlbedo = Affine(field.indexToWorld.inverse());
     } else {
-      if (maxComponent(field.constant) > 1) reader.fail("albedo", fmt::format("albedo is {}; it must be at most 1", maxComponent(field.constant)));
+      if (maxComponent(field.constant) > 1)
+        reader.fail("albedo", fmt::format("albedo is {}; it must be at most 1", maxComponent(field.constant)));
       medium.albedo = field.constant;
     }
     return;
@@ -167,12 +173,15 @@ void requireTrackable(PluginReader& reader, const MediumView& medium) {
   constexpr float kMostMeanFreePaths = 1e6f;
   const GridView& g = medium.density;
   float densest = g.background;
-  const size_t cells = static_cast<size_t>(g.majorant.nx) * static_cast<size_t>(g.majorant.ny) * static_cast<size_t>(g.majorant.nz);
+  const size_t cells =
+      static_cast<size_t>(g.majorant.nx) * static_cast<size_t>(g.majorant.ny) * static_cast<size_t>(g.majorant.nz);
   for (size_t i = 0; i < cells; ++i) densest = std::max(densest, g.majorant.values[i]);
   const float across = length(g.supportHi - g.supportLo) / length(medium.worldToDensity.x);
   const float thickness = densest * medium.sigmaT * across;
   if (!(thickness <= kMostMeanFreePaths))
-    reader.fail("scale", fmt::format("the medium is {:.2g} mean free paths thick; at most {:.0e} can be tracked", thickness, kMostMeanFreePaths),
+    reader.fail("scale",
+                fmt::format("the medium is {:.2g} mean free paths thick; at most {:.0e} can be tracked", thickness,
+                            kMostMeanFreePaths),
                 "reduce \"scale\"");
 }
 
@@ -204,7 +213,8 @@ MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
 }
 
 bool sameGrid(const GridView& a, const GridView& b) {
-  return a.kind == b.kind && a.dense.values == b.dense.values && a.sparse.grid == b.sparse.grid && a.background == b.background;
+  return a.kind == b.kind && a.dense.values == b.dense.values && a.sparse.grid == b.sparse.grid &&
+         a.background == b.background;
 }
 
 bool sameMedium(const MediumView& a, const MediumView& b) {
@@ -213,10 +223,11 @@ bool sameMedium(const MediumView& a, const MediumView& b) {
          a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase;
 }
 
-// Media of equal content are one, as if they had been referred to: a boundary whose exterior repeats what surrounds it means
-// that very medium.
+// Media of equal content are one, as if they had been referred to: a boundary whose exterior repeats what surrounds it
+// means that very medium.
 int indexOf(std::vector<MediumView>& media, const MediumView& medium) {
-  const auto known = std::find_if(media.begin(), media.end(), [&](const MediumView& m) { return sameMedium(m, medium); });
+  const auto known =
+      std::find_if(media.begin(), media.end(), [&](const MediumView& m) { return sameMedium(m, medium); });
   if (known == media.end()) return media.push_back(medium), static_cast<int>(media.size()) - 1;
   return static_cast<int>(known - media.begin());
 }

@@ -22,7 +22,9 @@ PixelFilter gaussianFilter(float sigma) {
   PixelFilter filter{PixelFilter::Kind::gaussian, 4 * sigma, {}};
   constexpr int kSteps = 1 << 14;
   const double radius = static_cast<double>(filter.radius), s = static_cast<double>(sigma);
-  const auto value = [&](double x) { return std::exp(-x * x / (2 * s * s)) - std::exp(-radius * radius / (2 * s * s)); };
+  const auto value = [&](double x) {
+    return std::exp(-x * x / (2 * s * s)) - std::exp(-radius * radius / (2 * s * s));
+  };
   // What lies beyond the offset radius * (1 - i / kSteps), summed from the tail inward: small shares keep their digits.
   std::vector<double> beyond(kSteps + 1, 0.0);
   for (int i = 0; i < kSteps; ++i)
@@ -42,7 +44,10 @@ PixelFilter buildFilter(BuildContext& context, const NodePtr& node) {
   using Build = PixelFilter (*)(PluginReader&);
   static constexpr PluginRow<Build> kFilters[] = {
       {"box", [](PluginReader&) { return PixelFilter{}; }},
-      {"tent", [](PluginReader& r) { return PixelFilter{PixelFilter::Kind::tent, r.number("radius", 1, r.positive()), {}}; }},
+      {"tent",
+       [](PluginReader& r) {
+         return PixelFilter{PixelFilter::Kind::tent, r.number("radius", 1, r.positive()), {}};
+       }},
       {"gaussian", [](PluginReader& r) { return gaussianFilter(r.number("stddev", 0.5f, r.positive())); }}};
   PluginReader reader(*node, context.diagnostics);
   const PixelFilter filter = findPlugin(*node, kFilters, kFiltersNotYet)(reader);
@@ -61,9 +66,11 @@ void readCrop(PluginReader& reader, PerspectiveCamera& camera) {
   camera.width = reader.has("crop_width") ? pixels(reader, "crop_width", 1) : camera.filmWidth - camera.cropX;
   camera.height = reader.has("crop_height") ? pixels(reader, "crop_height", 1) : camera.filmHeight - camera.cropY;
   if (camera.width < 1 || camera.cropX + camera.width > camera.filmWidth)
-    reader.fail("crop_width", fmt::format("the crop window leaves the film, which is {} pixels wide", camera.filmWidth));
+    reader.fail("crop_width",
+                fmt::format("the crop window leaves the film, which is {} pixels wide", camera.filmWidth));
   if (camera.height < 1 || camera.cropY + camera.height > camera.filmHeight)
-    reader.fail("crop_height", fmt::format("the crop window leaves the film, which is {} pixels high", camera.filmHeight));
+    reader.fail("crop_height",
+                fmt::format("the crop window leaves the film, which is {} pixels high", camera.filmHeight));
 }
 
 void buildFilm(BuildContext& context, const Node& node) {
@@ -132,12 +139,14 @@ void buildPerspective(BuildContext& context, PluginReader& reader) {
   reader.ignore("focus_distance");
   reader.ignore("shutter_open");
   reader.ignore("shutter_close");
-  if (const NodePtr medium = reader.child("medium")) context.scene.view.cameraMedia.setBase(buildMedium(context, *medium));
+  if (const NodePtr medium = reader.child("medium"))
+    context.scene.view.cameraMedia.setBase(buildMedium(context, *medium));
 }
 
 void readSampler(BuildContext& context, const Node& node) {
-  static constexpr PluginRow<int> kSamplers[] = {{"independent", 0}, {"stratified", 0}, {"multijitter", 0}, {"orthogonal", 0},
-                                                 {"ldsampler", 0},   {"halton", 0},     {"hammersley", 0},  {"sobol", 0}};
+  static constexpr PluginRow<int> kSamplers[] = {{"independent", 0}, {"stratified", 0}, {"multijitter", 0},
+                                                 {"orthogonal", 0},  {"ldsampler", 0},  {"halton", 0},
+                                                 {"hammersley", 0},  {"sobol", 0}};
   findPlugin(node, kSamplers, {});  // Virga has one sampler of its own; of the scene's it takes the number of samples
   PluginReader reader(node, context.diagnostics);
   context.scene.integrator.sampleCount = reader.integer("sample_count", 16, {.lo = 1, .hi = 1e9});

@@ -6,7 +6,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kNotYet[] = {"cylinder", "gltf", "shapegroup", "instance", "serialized", "bsplinecurve", "linearcurve", "sdfgrid"};
+constexpr std::string_view kNotYet[] = {"cylinder",   "gltf",         "shapegroup",  "instance",
+                                        "serialized", "bsplinecurve", "linearcurve", "sdfgrid"};
 
 /// What a shape's surface is for: boundaries need no triangles where an analytic form will do.
 enum class Role { surface, boundary };
@@ -14,7 +15,8 @@ enum class Role { surface, boundary };
 void measure(BuiltShape& shape) {
   std::vector<float> areas;
   const std::vector<Vec3>& p = shape.mesh.positions;
-  for (const auto& t : shape.mesh.triangles) areas.push_back(0.5f * length(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])));
+  for (const auto& t : shape.mesh.triangles)
+    areas.push_back(0.5f * length(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])));
   shape.triangleChoice = Discrete(areas);
   shape.area = static_cast<float>(shape.triangleChoice.total());
   for (const Vec3& v : p) shape.bounds.extend(v);
@@ -132,9 +134,9 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShap
 }
 
 using Build = void (*)(BuildContext&, PluginReader&, Role, BuiltShape&);
-constexpr PluginRow<Build> kShapes[] = {{"sphere", buildSphere},           {"rectangle", buildRectangle},
-                                        {"cube", buildCube},               {"disk", buildDisk},
-                                        {"obj", buildMesh<MeshFormat::obj>}, {"ply", buildMesh<MeshFormat::ply>}};
+constexpr PluginRow<Build> kShapes[] = {
+    {"sphere", buildSphere}, {"rectangle", buildRectangle},       {"cube", buildCube},
+    {"disk", buildDisk},     {"obj", buildMesh<MeshFormat::obj>}, {"ply", buildMesh<MeshFormat::ply>}};
 
 // Geometry by its parameters: what hangs on the shape (materials, media, lights) may change without building it again.
 std::shared_ptr<const BuiltShape> geometry(BuildContext& context, PluginReader& reader, Role role) {

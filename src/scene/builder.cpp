@@ -44,12 +44,13 @@ void measureBounds(Scene& scene, const Scene::Parts& parts) {
   scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
 }
 
-// In how many boxes a point may lie; no more than `enough` are counted. The deepest place begins at the lower x of one box, the
-// lower y of another and the lower z of a third.
+// In how many boxes a point may lie; no more than `enough` are counted. The deepest place begins at the lower x of one
+// box, the lower y of another and the lower z of a third.
 int deepestOverlap(const std::vector<Bounds>& boxes, int enough) {
   const auto holding = [](const std::vector<Bounds>& all, int axis, float x) {
     std::vector<Bounds> some;
-    std::copy_if(all.begin(), all.end(), std::back_inserter(some), [&](const Bounds& b) { return b.lo[axis] <= x && x < b.hi[axis]; });
+    std::copy_if(all.begin(), all.end(), std::back_inserter(some),
+                 [&](const Bounds& b) { return b.lo[axis] <= x && x < b.hi[axis]; });
     return some;
   };
   size_t deepest = 0;
@@ -73,8 +74,9 @@ void warnOfOverlaps(BuildContext& context) {
     if (!context.parts.boundaries[i].replaces) boxes.push_back(context.parts.boundaryShapes[i]->bounds);
   constexpr size_t kFew = 64;  // the search is of the fourth power; scenes of more volumes go without this warning
   if (boxes.size() <= kFew && deepestOverlap(boxes, MediaState::kCapacity + 1) > MediaState::kCapacity)
-    context.diagnostics.warnings.push_back(fmt::format(
-        "warning: more than {0} volumes may overlap; where more than {0} do, the others are left out", MediaState::kCapacity));
+    context.diagnostics.warnings.push_back(
+        fmt::format("warning: more than {0} volumes may overlap; where more than {0} do, the others are left out",
+                    MediaState::kCapacity));
 }
 
 // What makes a picture black, or leaves light out, without being an error.
@@ -82,7 +84,8 @@ void warnOfDarkness(BuildContext& context) {
   const Scene::Parts& parts = context.parts;
   if (!(parts.emitterChoice.total() > 0))
     context.diagnostics.warnings.push_back("warning: the scene has no emitter that shines: its picture is black");
-  const bool points = std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
+  const bool points =
+      std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
   const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
     return parts.bsdfs[static_cast<size_t>(s.bsdf)].front.transmits();
   });
@@ -116,14 +119,16 @@ std::filesystem::path BuildContext::file(PluginReader& reader, std::string_view 
   reader.fail(parameter, fmt::format("file \"{}\" not found", name), "", tried);
 }
 
-void failUnknownType(const Node& node, std::span<const std::string_view> available, std::span<const std::string_view> notYet) {
+void failUnknownType(const Node& node, std::span<const std::string_view> available,
+                     std::span<const std::string_view> notYet) {
   std::vector<std::string> known(available.begin(), available.end());
   std::sort(known.begin(), known.end());
   const std::vector<std::string> notes{"available: " + joined(known)};
   const SourcePosition position = node.typePosition.known() ? node.typePosition : node.position;
   if (std::find(notYet.begin(), notYet.end(), node.type) != notYet.end())
     throw Error(fmt::format("{} type \"{}\" is not supported yet", node.tag, node.type), {position, "", notes});
-  throw Error(fmt::format("unknown {} type \"{}\"", node.tag, node.type), {position, didYouMean(node.type, known), notes});
+  throw Error(fmt::format("unknown {} type \"{}\"", node.tag, node.type),
+              {position, didYouMean(node.type, known), notes});
 }
 
 std::string parameterKey(const Node& node) {
@@ -139,13 +144,15 @@ std::string fileKey(const std::filesystem::path& path) {
   return fmt::format("{}@{}", path.string(), time);
 }
 
-SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions& options, const SceneSnapshot& previous) {
+SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions& options,
+                         const SceneSnapshot& previous) {
   VIRGA_ASSERT(description.root);
   auto scene = std::make_shared<Scene>();
   auto parts = std::make_shared<Scene::Parts>();
   scene->description = description;
-  BuildContext context{description, options, {.lenient = options.lenient, .warnings = {}}, *scene, *parts,
-                       previous ? &previous->parts->cache : nullptr, {}, {}};
+  BuildContext context{description, options, {.lenient = options.lenient, .warnings = {}},
+                       *scene,      *parts,  previous ? &previous->parts->cache : nullptr,
+                       {},          {}};
 
   PluginReader reader(*description.root, context.diagnostics);
   if (const NodePtr integrator = onlyChild(reader, "integrator")) buildIntegrator(context, *integrator);

@@ -13,8 +13,8 @@ struct BuildOptions {
   bool lenient = false;                         ///< unknown and unused parameters become warnings
 };
 
-/// Validates a description and makes the scene that it describes. Objects that `previous` holds already are shared, not built
-/// again. Throws Error with a position for whatever is wrong.
+/// Validates a description and makes the scene that it describes. Objects that `previous` holds already are shared, not
+/// built again. Throws Error with a position for whatever is wrong.
 SceneSnapshot buildScene(const SceneDescription&, const BuildOptions& = {}, const SceneSnapshot& previous = nullptr);
 
 }  // namespace virga

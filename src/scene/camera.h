@@ -16,8 +16,8 @@ struct PixelFilter {
 
   Kind kind = Kind::box;
   float radius = 0.5f;  ///< [pixels]
-  /// Gaussian: offset [pixels] beyond which lies the share v^2 of a half of the filter, at v = i / kTableSize. The square root
-  /// resolves the tails, where the offset as a function of the share itself is steep.
+  /// Gaussian: offset [pixels] beyond which lies the share v^2 of a half of the filter, at v = i / kTableSize. The
+  /// square root resolves the tails, where the offset as a function of the share itself is steep.
   std::array<float, kTableSize + 1> tail{};
 
   /// Offset from the pixel's centre [pixels].
@@ -29,23 +29,25 @@ struct PixelFilter {
     if (kind == Kind::tent) return u < 0.5f ? radius * (std::sqrt(2 * u) - 1) : radius * (1 - std::sqrt(2 - 2 * u));
     const float side = 2 * u - 1, x = std::sqrt(1 - std::fabs(side)) * kTableSize;
     const int i = x < kTableSize ? static_cast<int>(x) : kTableSize - 1;
-    const float offset = lerp(tail[static_cast<size_t>(i)], tail[static_cast<size_t>(i + 1)], x - static_cast<float>(i));
+    const float offset =
+        lerp(tail[static_cast<size_t>(i)], tail[static_cast<size_t>(i + 1)], x - static_cast<float>(i));
     return std::copysign(offset, side);
   }
 };
 
 struct CameraRay {
-  Ray ray;           ///< starts on the near plane
-  float tMax = 0;    ///< at the far plane
+  Ray ray;         ///< starts on the near plane
+  float tMax = 0;  ///< at the far plane
 };
 
 /// Pinhole camera that looks along +z of its own frame, +x to the left of the picture, +y up.
 struct PerspectiveCamera {
   Affine toWorld;
-  float tanX = 1, tanY = 1;      ///< tangents of half the field of view
-  float shiftX = 0, shiftY = 0;  ///< of the film against the optical axis, in its widths and heights (principal point offset)
-  float nearClip = 1e-2f, farClip = 1e4f;  ///< distances along the axis [unit]
-  int filmWidth = 1, filmHeight = 1;       ///< of the whole film [pixels]
+  float tanX = 1, tanY = 1;  ///< tangents of half the field of view
+  float shiftX = 0,
+        shiftY = 0;  ///< of the film against the optical axis, in its widths and heights (principal point offset)
+  float nearClip = 1e-2f, farClip = 1e4f;           ///< distances along the axis [unit]
+  int filmWidth = 1, filmHeight = 1;                ///< of the whole film [pixels]
   int cropX = 0, cropY = 0, width = 1, height = 1;  ///< the part that is rendered [pixels]
 
   /// (x, y) in pixels of the crop window, from its top left corner.

@@ -41,7 +41,8 @@ struct Node {
   bool hasGeneratedId() const { return id.starts_with('_'); }
 };
 
-/// A scene as its author wrote it: a typed tree with source positions, immutable and shared. Objects that were referenced
+/// A scene as its author wrote it: a typed tree with source positions, immutable and shared. Objects that were
+/// referenced
 /// (`ref`) are the same pointer in several places.
 struct SceneDescription {
   NodePtr root;                                    ///< tag "scene"
@@ -51,8 +52,8 @@ struct SceneDescription {
 /// The node with that id, or null.
 NodePtr findNode(const SceneDescription&, std::string_view id);
 
-/// A copy in which one parameter of one node has another value (added where it was absent). All nodes that the edit does not
-/// reach are shared with the original. Throws Error for an unknown id.
+/// A copy in which one parameter of one node has another value (added where it was absent). All nodes that the edit
+/// does not reach are shared with the original. Throws Error for an unknown id.
 SceneDescription edited(const SceneDescription&, std::string_view nodeId, std::string_view property, Value value);
 
 /// Mitsuba 3 XML that loads to an equal description (ids, types, parameters; references stay references).

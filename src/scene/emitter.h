@@ -9,14 +9,14 @@
 
 namespace virga {
 
-/// A latitude-longitude picture around the scene: u = 0 at -z of its own frame, 0.25 at +x; v from +y down. As in Mitsuba 3 the
-/// first and the last row of pixels are the poles, whereas the columns' centres lie at (i + 0.5) / width.
+/// A latitude-longitude picture around the scene: u = 0 at -z of its own frame, 0.25 at +x; v from +y down. As in
+/// Mitsuba 3 the first and the last row of pixels are the poles, whereas the columns' centres lie at (i + 0.5) / width.
 struct EnvironmentView {
   const Rgb* pixels = nullptr;
   int width = 0, height = 0;
-  DiscreteView rows;          ///< marginal, over pixel rows
+  DiscreteView rows;               ///< marginal, over pixel rows
   const float* columns = nullptr;  ///< conditional cumulative tables, width + 1 values a row
-  Affine toWorld, toLocal;    ///< rotations
+  Affine toWorld, toLocal;         ///< rotations
   float scale = 1;
 
   /// Radiance from direction w (away from the scene) [W/(m^2 sr)], bilinear between pixels.
@@ -27,7 +27,9 @@ struct EnvironmentView {
     const float fx = x - std::floor(x), fy = y - std::floor(y);
     const int x0 = (static_cast<int>(std::floor(x)) + width) % width, x1 = (x0 + 1) % width;
     const int y0 = static_cast<int>(y), y1 = y0 + 1 < height ? y0 + 1 : y0;
-    const auto at = [&](int i, int j) { return pixels[static_cast<size_t>(j) * static_cast<size_t>(width) + static_cast<size_t>(i)]; };
+    const auto at = [&](int i, int j) {
+      return pixels[static_cast<size_t>(j) * static_cast<size_t>(width) + static_cast<size_t>(i)];
+    };
     const Rgb top = at(x0, y0) * (1 - fx) + at(x1, y0) * fx, bottom = at(x0, y1) * (1 - fx) + at(x1, y1) * fx;
     return (top * (1 - fy) + bottom * fy) * scale;
   }
@@ -65,7 +67,9 @@ struct EnvironmentView {
     return {columns + static_cast<size_t>(row) * static_cast<size_t>(width + 1), width};
   }
   VIRGA_HD float solidAngleDensity(float pixelProbability, float sinTheta) const {
-    return sinTheta > 0 ? pixelProbability * static_cast<float>(width) * static_cast<float>(height) / (2 * kPi * kPi * sinTheta) : 0;
+    return sinTheta > 0
+               ? pixelProbability * static_cast<float>(width) * static_cast<float>(height) / (2 * kPi * kPi * sinTheta)
+               : 0;
   }
 };
 
@@ -74,13 +78,13 @@ struct EmitterView {
   enum class Kind : uint8_t { point, spot, directional, area, constant, environment };
 
   Kind kind = Kind::point;
-  Rgb value;            ///< intensity [W/sr], irradiance across the beam [W/m^2] or radiance [W/(m^2 sr)]
-  Vec3 position;        ///< point, spot
-  Vec3 direction;       ///< spot, directional: unit, in which the light travels
+  Rgb value;       ///< intensity [W/sr], irradiance across the beam [W/m^2] or radiance [W/(m^2 sr)]
+  Vec3 position;   ///< point, spot
+  Vec3 direction;  ///< spot, directional: unit, in which the light travels
   float cutoffAngle = 0, beamWidth = 0;  ///< spot [rad]
-  int shape = -1;       ///< area: index of its surface
-  DiscreteView triangles;  ///< area, mesh: by area
-  float area = 0;       ///< area [unit^2]
+  int shape = -1;                        ///< area: index of its surface
+  DiscreteView triangles;                ///< area, mesh: by area
+  float area = 0;                        ///< area [unit^2]
   EnvironmentView environment;
 
   VIRGA_HD bool infinite() const {
@@ -91,8 +95,8 @@ struct EmitterView {
   /// Has positions at a finite distance to aim at (equiangular sampling).
   VIRGA_HD bool isLocal() const { return !infinite(); }
 
-  /// Radiant intensity toward unit direction w of a point or spot light [W/sr]. Spot: full within the beam width, linear in the
-  /// angle down to 0 at the cutoff.
+  /// Radiant intensity toward unit direction w of a point or spot light [W/sr]. Spot: full within the beam width,
+  /// linear in the angle down to 0 at the cutoff.
   VIRGA_HD Rgb intensity(Vec3 w) const {
     if (kind == Kind::point) return value;
     const float angle = std::acos(clamp(dot(direction, w), -1, 1));
@@ -108,14 +112,15 @@ struct LightSample {
   Rgb radiance;        ///< toward the receiver; for delta lights the incident irradiance [W/m^2] across wi
   float pdf = 0;       ///< [1/sr] of wi; 1 for delta lights; 0: no sample
   bool delta = false;
-  float uniformPdf = 0;  ///< [1/sr] that wi would have, were the point chosen uniformly on the light; 1 for point-like lights
+  float uniformPdf =
+      0;  ///< [1/sr] that wi would have, were the point chosen uniformly on the light; 1 for point-like lights
 };
 
 /// A point on an emitter, chosen without regard to any receiver.
 struct LightPoint {
   Vec3 p;
-  Vec3 normal;         ///< of an area light
-  float areaPdf = 0;   ///< [1/unit^2]; 1 for point-like lights; 0: no sample
+  Vec3 normal;        ///< of an area light
+  float areaPdf = 0;  ///< [1/unit^2]; 1 for point-like lights; 0: no sample
   bool pointLike = false;
 };
 
@@ -145,7 +150,9 @@ VIRGA_HD inline float coneHeight(float radius, float d) {
 }
 
 /// A sphere light is sampled by the cone that it fills, as seen from outside at distance d of its centre.
-VIRGA_HD inline bool seenAsCone(const ShapeView& sphere, float d) { return d > sphere.radius && sphere.orientation > 0; }
+VIRGA_HD inline bool seenAsCone(const ShapeView& sphere, float d) {
+  return d > sphere.radius && sphere.orientation > 0;
+}
 
 /// Density [1/sr, seen from x] of a point that is chosen uniformly on an area light.
 VIRGA_HD inline float uniformPointPdf(const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
@@ -155,7 +162,8 @@ VIRGA_HD inline float uniformPointPdf(const EmitterView& emitter, Vec3 x, Vec3 o
   return cosLight > 0 ? d2 / (cosLight * emitter.area) : 0;
 }
 
-/// Density [1/sr] with which sampleLight picks the point `on` of an area emitter, seen from x; the point is known to face x.
+/// Density [1/sr] with which sampleLight picks the point `on` of an area emitter, seen from x; the point is known to
+/// face x.
 VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec3 on, Vec3 normal) {
   if (shape.kind == ShapeView::Kind::sphere) {
     const float d = distance(x, shape.center);
@@ -184,8 +192,8 @@ VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const Emit
   if (!seenAsCone(shape, d)) return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
   const float height = coneHeight(shape.radius, d);
   const Vec3 local = uniformCone(u, height);
-  // By the triangle of receiver, centre and hit: the ray passes the centre at d sin(theta), and half the chord is r times the
-  // cosine at the light. From afar the hit point's own coordinates would not tell.
+  // By the triangle of receiver, centre and hit: the ray passes the centre at d sin(theta), and half the chord is r
+  // times the cosine at the light. From afar the hit point's own coordinates would not tell.
   const float miss2 = d * d * (local.x * local.x + local.y * local.y);
   const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
   const float t = std::fmax(0.f, d * local.z - half);

@@ -10,7 +10,7 @@ namespace virga {
 
 /// A participating medium: sigma_t(x) = sigmaT * density(x) [1/unit], the same for R, G and B; albedo may be coloured.
 struct MediumView {
-  float sigmaT = 0;  ///< [1/unit] at density 1
+  float sigmaT = 0;         ///< [1/unit] at density 1
   bool homogeneous = true;  ///< density is 1 everywhere
   GridView density;
   Affine worldToDensity;  ///< world to index coordinates of the density
@@ -24,9 +24,7 @@ struct MediumView {
   VIRGA_HD float sigmaTAt(Vec3 p) const {
     return homogeneous ? sigmaT : sigmaT * density.lookup(worldToDensity.point(p));
   }
-  VIRGA_HD Rgb albedoAt(Vec3 p) const {
-    return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo;
-  }
+  VIRGA_HD Rgb albedoAt(Vec3 p) const { return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo; }
 };
 
 /// What a boundary says about the media on its two sides; indices into the scene's media, kNone is vacuum.
@@ -40,9 +38,9 @@ struct MediumTransition {
 
 enum class Passing : uint8_t { inward, outward };
 
-/// Which media a point lies in. Two mechanisms (docs/scene-format.md): a boundary that *replaces* sets the base medium; closed
-/// null boundaries *add* their interior while the point is inside them. Applying a crossing twice changes nothing, so double
-/// hits on shared edges and coplanar faces do no harm.
+/// Which media a point lies in. Two mechanisms (docs/scene-format.md): a boundary that *replaces* sets the base medium;
+/// closed null boundaries *add* their interior while the point is inside them. Applying a crossing twice changes
+/// nothing, so double hits on shared edges and coplanar faces do no harm.
 class MediaState {
  public:
   static constexpr int kCapacity = 8;
@@ -60,8 +58,8 @@ class MediaState {
   }
   /// Into a shape that replaces: its medium, or vacuum, hides all others around it.
   VIRGA_HD void replace(int medium) { base_ = medium, exclusive_ = medium != kNone, hidden_ = count_; }
-  /// Out of it. If its exterior is one of the media in which it lies, or not declared, all those are there again: what is where
-  /// must not depend on the way.
+  /// Out of it. If its exterior is one of the media in which it lies, or not declared, all those are there again: what
+  /// is where must not depend on the way.
   VIRGA_HD void returnTo(int medium) {
     base_ = medium, exclusive_ = false, hidden_ = 0;
     exclusive_ = baseCounts();
@@ -103,8 +101,8 @@ class MediaState {
     int32_t boundary, medium;
   };
 
-  // A base medium that is the interior of a boundary we are in was declared twice (a camera inside a cloud that names the
-  // cloud's medium): it counts once.
+  // A base medium that is the interior of a boundary we are in was declared twice (a camera inside a cloud that names
+  // the cloud's medium): it counts once.
   VIRGA_HD bool baseCounts() const {
     if (base_ == kNone) return false;
     for (int i = 0; i < count_; ++i)

@@ -8,7 +8,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kTypeNames[] = {"boolean", "integer", "float", "string", "point or vector", "rgb", "transform", "object"};
+constexpr std::string_view kTypeNames[] = {"boolean",         "integer", "float",     "string",
+                                           "point or vector", "rgb",     "transform", "object"};
 
 std::string_view typeName(const Value& value) {
   if (const NodePtr* node = std::get_if<NodePtr>(&value)) return (*node)->tag;
@@ -52,7 +53,8 @@ SourcePosition PluginReader::positionOf(std::string_view parameter) const {
   return node_.typePosition.known() ? node_.typePosition : node_.position;
 }
 
-void PluginReader::fail(std::string_view parameter, std::string message, std::string hint, std::vector<std::string> notes) {
+void PluginReader::fail(std::string_view parameter, std::string message, std::string hint,
+                        std::vector<std::string> notes) {
   throw Error(std::move(message), {positionOf(parameter), std::move(hint), std::move(notes)});
 }
 
@@ -66,7 +68,8 @@ double PluginReader::checkedNumber(std::string_view name, double value, const Ra
   if (!std::isfinite(static_cast<float>(value))) fail(name, fmt::format("\"{}\" is too large", name));
   if (!inRange(value, range)) {
     const auto single = static_cast<float>(value);  // prints with the digits that were written
-    const std::string text = static_cast<double>(single) == value ? fmt::format("{}", single) : fmt::format("{}", value);
+    const std::string text =
+        static_cast<double>(single) == value ? fmt::format("{}", single) : fmt::format("{}", value);
     fail(name, fmt::format("\"{}\" is {}; it must be {}", name, text, rangeText(range)));
   }
   return value;
@@ -117,11 +120,14 @@ Rgb PluginReader::color(std::string_view name, Rgb fallback, const Range& range)
   const Property* p = find(name);
   if (!p) return fallback;
   Rgb result;
-  if (const auto* c = std::get_if<Rgb>(&p->value)) result = *c;
-  else if (const auto* d = std::get_if<double>(&p->value)) result = Rgb(static_cast<float>(*d));
+  if (const auto* c = std::get_if<Rgb>(&p->value))
+    result = *c;
+  else if (const auto* d = std::get_if<double>(&p->value))
+    result = Rgb(static_cast<float>(*d));
   else if (const auto* n = std::get_if<NodePtr>(&p->value); n && (*n)->tag == "texture")
     fail(name, fmt::format("textures (\"{}\") are not supported yet", (*n)->type), "give an rgb value");
-  else fail(name, fmt::format("\"{}\" must be an rgb value, not a {}", name, typeName(p->value)));
+  else
+    fail(name, fmt::format("\"{}\" must be an rgb value, not a {}", name, typeName(p->value)));
   for (int i = 0; i < 3; ++i) checkedNumber(name, static_cast<double>(result[i]), range);
   return result;
 }
@@ -135,7 +141,8 @@ Matrix4 PluginReader::transform(std::string_view name) {
   const Affine single(*m);
   if (!isFinite(single.x) || !isFinite(single.y) || !isFinite(single.z) || !isFinite(single.translation))
     fail(name, fmt::format("the transform \"{}\" is too large", name));
-  if (!m->isAffine()) fail(name, fmt::format("the transform \"{}\" is a projection; its last row must be 0 0 0 1", name));
+  if (!m->isAffine())
+    fail(name, fmt::format("the transform \"{}\" is a projection; its last row must be 0 0 0 1", name));
   if (m->isSingular()) fail(name, fmt::format("the transform \"{}\" is singular: it flattens space", name));
   return *m;
 }
@@ -145,7 +152,8 @@ size_t PluginReader::oneOf(std::string_view name, std::string_view fallback, std
   for (size_t i = 0; i < words.size(); ++i)
     if (words[i] == word) return i;
   const std::vector<std::string> known(words.begin(), words.end());
-  fail(name, fmt::format("unknown value \"{}\" of \"{}\"", word, name), didYouMean(word, known), {"available: " + joined(known)});
+  fail(name, fmt::format("unknown value \"{}\" of \"{}\"", word, name), didYouMean(word, known),
+       {"available: " + joined(known)});
 }
 
 NodePtr PluginReader::child(std::string_view tag, std::string_view name) {
@@ -184,8 +192,8 @@ void PluginReader::finish() {
                                               p.name.empty() ? "" : fmt::format(" named \"{}\"", p.name), owner),
                                   {p.position, didYouMean(p.name, known), notes}));
     else
-      diagnostics_.complain(
-          Error(fmt::format("unknown parameter \"{}\" of {}", p.name, owner), {p.position, didYouMean(p.name, known), notes}));
+      diagnostics_.complain(Error(fmt::format("unknown parameter \"{}\" of {}", p.name, owner),
+                                  {p.position, didYouMean(p.name, known), notes}));
   }
 }
 

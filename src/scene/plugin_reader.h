@@ -21,8 +21,8 @@ struct BuildDiagnostics {
   void complain(const Error& error);
 };
 
-/// Reads a plugin's parameters, each with its type and range, and knows in the end which were never asked for: those are errors,
-/// with what could have been meant.
+/// Reads a plugin's parameters, each with its type and range, and knows in the end which were never asked for: those
+/// are errors, with what could have been meant.
 class PluginReader {
  public:
   PluginReader(const Node& node, BuildDiagnostics& diagnostics) : node_(node), diagnostics_(diagnostics) {}

@@ -78,7 +78,8 @@ ChangeSet differences(const SceneDescription& before, const SceneDescription& af
     if (other == b.end() || other->second->tag != node->tag) {
       add(id, aspectOfPresence(node->tag));
     } else if (node != other->second && node->tag != "scene") {
-      for (const std::string& parameter : changedParameters(*node, *other->second)) add(id, aspectOf(node->tag, parameter));
+      for (const std::string& parameter : changedParameters(*node, *other->second))
+        add(id, aspectOf(node->tag, parameter));
     }
   }
   for (const auto& [id, node] : b)
@@ -109,8 +110,8 @@ Surroundings enclosingSurface(const SceneView& view, const RayScene& surfaces, c
 }  // namespace
 
 MediaState mediaAt(const Scene& scene, Vec3 p) {
-  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those that
-  // replace, the nearest is the innermost.
+  // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those
+  // that replace, the nearest is the innermost.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
   Surroundings base = enclosingSurface(scene.view, *scene.surfaceRays, ray);
   std::vector<Crossing> around;
@@ -131,9 +132,12 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
     const float last = list.items[list.count - 1].t, before = std::nextafter(last, -kInfinity);
     from = before > from ? before : std::nextafter(last, kInfinity);
   }
-  // As if they had been entered from outside: what lies farther than the one that replaces, that one, what lies within it.
+  // As if they had been entered from outside: what lies farther than the one that replaces, that one, what lies within
+  // it.
   MediaState state;
-  const auto enter = [&](const Crossing& c) { state.enter(static_cast<int>(c.shape), scene.view.boundaries[c.shape].interior); };
+  const auto enter = [&](const Crossing& c) {
+    state.enter(static_cast<int>(c.shape), scene.view.boundaries[c.shape].interior);
+  };
   for (const Crossing& c : around)
     if (c.t >= base.t) enter(c);
   if (base.t < kInfinity) state.replace(base.medium);

@@ -14,12 +14,13 @@ namespace virga {
 
 /// What the scene file says about rendering; methods read it where their own settings are silent.
 struct IntegratorHints {
-  int maxDepth = -1;    ///< longest path in segments; -1: no limit
-  int rrDepth = 5;      ///< segments before Russian roulette begins
-  int sampleCount = 16; ///< samples a pixel
+  int maxDepth = -1;     ///< longest path in segments; -1: no limit
+  int rrDepth = 5;       ///< segments before Russian roulette begins
+  int sampleCount = 16;  ///< samples a pixel
 };
 
-/// An immutable, renderable scene. Made by buildScene; parts that an edit does not touch are shared with the scene before.
+/// An immutable, renderable scene. Made by buildScene; parts that an edit does not touch are shared with the scene
+/// before.
 struct Scene {
   SceneDescription description;
   PerspectiveCamera camera;
@@ -30,7 +31,7 @@ struct Scene {
   std::shared_ptr<const RayScene> boundaryRays;  ///< all shapes of null BSDF
   std::vector<std::string> warnings;
 
-  struct Parts;                        ///< owners of what `view` points to; the builder's business
+  struct Parts;  ///< owners of what `view` points to; the builder's business
   std::shared_ptr<const Parts> parts;
 };
 
@@ -69,8 +70,8 @@ struct ChangeSet {
 /// By the ids of the objects in both descriptions.
 ChangeSet differences(const SceneDescription& before, const SceneDescription& after);
 
-/// The media around a point, away from all surfaces and boundaries, by the closed shapes that it lies in: the interiors of null
-/// boundaries, or of the innermost shape that replaces.
+/// The media around a point, away from all surfaces and boundaries, by the closed shapes that it lies in: the interiors
+/// of null boundaries, or of the innermost shape that replaces.
 MediaState mediaAt(const Scene&, Vec3 p);
 
 /// 64 bits of everything that the description says, for metadata.

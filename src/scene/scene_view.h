@@ -34,25 +34,28 @@ struct SceneView {
   View<SurfaceBsdf> bsdfs;
   View<MediumView> media;
   View<EmitterView> emitters;
-  DiscreteView emitterChoice;         ///< by power
-  int environment = -1;               ///< index of the constant or environment emitter, if any
-  MediaState cameraMedia;             ///< where camera rays start
-  Bounds bounds;                      ///< of all shapes
-  float scale = 1;                    ///< [unit] largest coordinate of the bounds
+  DiscreteView emitterChoice;  ///< by power
+  int environment = -1;        ///< index of the constant or environment emitter, if any
+  MediaState cameraMedia;      ///< where camera rays start
+  Bounds bounds;               ///< of all shapes
+  float scale = 1;             ///< [unit] largest coordinate of the bounds
 };
 
 /// Samples an emitter as seen from x; pdf counts directions, not the choice of the emitter.
 VIRGA_HD inline LightSample sampleLight(const SceneView& scene, const EmitterView& emitter, Vec3 x, Vec2 u) {
   switch (emitter.kind) {
     case EmitterView::Kind::point:
-    case EmitterView::Kind::spot: return towardPoint(emitter, x, {emitter.position, {}, 1, true});
-    case EmitterView::Kind::directional: return {-emitter.direction, kInfinity, emitter.value, 1, true};
+    case EmitterView::Kind::spot:
+      return towardPoint(emitter, x, {emitter.position, {}, 1, true});
+    case EmitterView::Kind::directional:
+      return {-emitter.direction, kInfinity, emitter.value, 1, true};
     case EmitterView::Kind::area: {
       const ShapeView& shape = scene.surfaces[emitter.shape];
       if (shape.kind == ShapeView::Kind::sphere) return sampleSphereLight(shape, emitter, x, u);
       return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
     }
-    case EmitterView::Kind::constant: return {uniformSphere(u), kInfinity, emitter.value, kInv4Pi, false};
+    case EmitterView::Kind::constant:
+      return {uniformSphere(u), kInfinity, emitter.value, kInv4Pi, false};
     case EmitterView::Kind::environment: {
       const auto s = emitter.environment.sample(u);
       return {s.w, kInfinity, emitter.environment.radiance(s.w), s.pdf, false};

@@ -18,12 +18,12 @@ struct ShapeView {
   const Vec3* positions = nullptr;
   const Vec3* normals = nullptr;  ///< per vertex, or null
   const std::array<uint32_t, 3>* triangles = nullptr;
-  Vec3 center, normal;            ///< sphere, disk
+  Vec3 center, normal;  ///< sphere, disk
   float radius = 0;
-  float orientation = 1;          ///< -1: normals are flipped
+  float orientation = 1;  ///< -1: normals are flipped
 
   int bsdf = 0;
-  int emitter = -1;               ///< index of the area emitter on it
+  int emitter = -1;  ///< index of the area emitter on it
   MediumTransition media;
 };
 
@@ -33,7 +33,7 @@ struct SurfacePoint {
   Vec3 geometricNormal;  ///< unit, as the shape orients it
   Vec3 shadingNormal;    ///< unit, on the same side
   uint32_t shape = 0;
-  float epsilon = 0;     ///< [unit] by how much p may lie off the surface
+  float epsilon = 0;  ///< [unit] by how much p may lie off the surface
 
   /// Where a ray that leaves toward w starts: a little off the surface on w's side.
   VIRGA_HD Vec3 originToward(Vec3 w) const {
@@ -55,7 +55,8 @@ VIRGA_HD inline SurfacePoint surfacePoint(const ShapeView& shape, const Ray& ray
     s.geometricNormal = normalize(cross(b - a, c - a)) * shape.orientation;
     s.shadingNormal = s.geometricNormal;
     if (shape.normals) {
-      const Vec3 n = shape.normals[triangle[0]] * w + shape.normals[triangle[1]] * hit.u + shape.normals[triangle[2]] * hit.v;
+      const Vec3 n =
+          shape.normals[triangle[0]] * w + shape.normals[triangle[1]] * hit.u + shape.normals[triangle[2]] * hit.v;
       const float l2 = lengthSquared(n);
       if (l2 > 0) s.shadingNormal = n * ((dot(n, s.geometricNormal) < 0 ? -1 : 1) / std::sqrt(l2));
     }

@@ -5,18 +5,18 @@
 
 namespace virga {
 
-/// Part of a ray in one homogeneous medium, where scattering points can be drawn in proportion to the inverse squared distance to
-/// a light (Kulla and Fajardo 2012) instead of by free flight. Before it the ray meets no medium.
+/// Part of a ray in one homogeneous medium, where scattering points can be drawn in proportion to the inverse squared
+/// distance to a light (Kulla and Fajardo 2012) instead of by free flight. Before it the ray meets no medium.
 struct EquiangularSegment {
-  /// Lights of less area than this, in squared mean free paths, are small: near them, connections from free flights have a
-  /// variance that is infinite (points) or nearly so. For larger ones hits by chance bound it.
+  /// Lights of less area than this, in squared mean free paths, are small: near them, connections from free flights
+  /// have a variance that is infinite (points) or nearly so. For larger ones hits by chance bound it.
   static constexpr float kSmallLight = 0.01f;
 
   int medium = -1;           ///< -1: there is none
   bool largeLights = false;  ///< to be aimed at, too
   Ray ray;
-  float t0 = 0, t1 = 0;    ///< t1 may be infinite
-  float sigmaT = 0;        ///< [1/unit]
+  float t0 = 0, t1 = 0;  ///< t1 may be infinite
+  float sigmaT = 0;      ///< [1/unit]
 
   VIRGA_HD bool active() const { return medium >= 0; }
   VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
@@ -53,7 +53,8 @@ struct EquiangularSegment {
     VIRGA_HD Angles(const EquiangularSegment& s, Vec3 y) {
       const Vec3 toLight = y - s.ray.o;
       foot = dot(toLight, s.ray.d);
-      // A light on the ray would leave no width to sample; the floor keeps the density finite and exact for what is drawn.
+      // A light on the ray would leave no width to sample; the floor keeps the density finite and exact for what is
+      // drawn.
       height = std::max(length(toLight - s.ray.d * foot), 1e-4f * std::max(std::fabs(foot), 1e-12f));
       start = s.t0 - foot;
       // atan(b) - atan(a) = atan2(b - a, 1 + a b)

@@ -5,8 +5,8 @@
 
 namespace virga {
 
-/// Where light was scattered on its way to the eye, as far as the layers need to know. Specular vertices are not recorded, only
-/// that there was one between x1 and the light.
+/// Where light was scattered on its way to the eye, as far as the layers need to know. Specular vertices are not
+/// recorded, only that there was one between x1 and the light.
 class LayerPath {
  public:
   enum class Vertex : uint8_t { none, surface, medium };

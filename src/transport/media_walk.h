@@ -15,8 +15,9 @@ struct MediaRay {
   Vec3 approach = {};  ///< unit direction from that point to the origin; without length: the ray's own
 };
 
-/// The ray that leaves a surface toward w. A boundary may coincide with the surface (a cloud that stands on the ground), and
-/// `media` may have been found on either side of it: crossings are looked for across the surface, from side to side.
+/// The ray that leaves a surface toward w. A boundary may coincide with the surface (a cloud that stands on the
+/// ground), and `media` may have been found on either side of it: crossings are looked for across the surface, from
+/// side to side.
 VIRGA_HD inline MediaRay leaveSurface(const SurfacePoint& point, Vec3 w, const MediaState& media) {
   const Vec3 across = dot(w, point.geometricNormal) >= 0 ? point.geometricNormal : -point.geometricNormal;
   return {{point.originToward(w), w}, media, 4 * point.epsilon, across};
@@ -52,8 +53,8 @@ VIRGA_HD bool insideBoundary(const Rays& rays, uint32_t shape, Vec3 p) {
   }
 }
 
-/// Applies the crossings of one place. Where a boundary is entered and left at once, or may have been, the ray touches or passes
-/// an edge or a corner: a point behind it decides.
+/// Applies the crossings of one place. Where a boundary is entered and left at once, or may have been, the ray touches
+/// or passes an edge or a corner: a point behind it decides.
 template <class Rays>
 VIRGA_HD void applyPlace(const SceneView& scene, const Rays& rays, const Crossing* crossings, int count, Vec3 behind,
                          MediaState& media) {
@@ -66,10 +67,11 @@ VIRGA_HD void applyPlace(const SceneView& scene, const Rays& rays, const Crossin
   }
 }
 
-/// Places along [0, tMax] where the ray crosses boundaries, in order: visit(t) before the media change there, until it returns
-/// false. Returns false if it did.
+/// Places along [0, tMax] where the ray crosses boundaries, in order: visit(t) before the media change there, until it
+/// returns false. Returns false if it did.
 template <class Rays, class Visit>
-VIRGA_HD bool walkPlaces(const SceneView& scene, const Rays& rays, const Ray& ray, float tMax, MediaState& media, Visit&& visit) {
+VIRGA_HD bool walkPlaces(const SceneView& scene, const Rays& rays, const Ray& ray, float tMax, MediaState& media,
+                         Visit&& visit) {
   const float scale = maxComponent(abs(ray.o));
   CrossingList list;
   for (float from = 0;; list.clear()) {
@@ -91,8 +93,9 @@ VIRGA_HD bool walkPlaces(const SceneView& scene, const Rays& rays, const Ray& ra
   }
 }
 
-/// Intervals of constant media along [0, tMax]: visit(t0, t1) while `r.media` holds the interval's media, until it returns false.
-/// Afterwards `r.media` is what holds where the walk ended. Boundaries are gathered as sorted crossings, never stepped over.
+/// Intervals of constant media along [0, tMax]: visit(t0, t1) while `r.media` holds the interval's media, until it
+/// returns false. Afterwards `r.media` is what holds where the walk ended. Boundaries are gathered as sorted crossings,
+/// never stepped over.
 template <class Rays, class Visit>
 VIRGA_HD void walkMedia(const SceneView& scene, const Rays& rays, MediaRay& r, float tMax, Visit&& visit) {
   float t = 0;
@@ -121,9 +124,10 @@ struct Collision {
   VIRGA_HD bool found() const { return medium >= 0; }
 };
 
-/// The first real collision within [t0, t1] in the media of the state. Coefficients add where media overlap, so the collision is
-/// the nearest of independent free flights.
-VIRGA_HD inline Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1, Pcg32& random) {
+/// The first real collision within [t0, t1] in the media of the state. Coefficients add where media overlap, so the
+/// collision is the nearest of independent free flights.
+VIRGA_HD inline Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1,
+                                          Pcg32& random) {
   Collision nearest;
   for (int i = 0; i < r.media.count(); ++i) {
     const int medium = r.media.medium(i);

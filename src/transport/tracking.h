@@ -27,8 +27,9 @@ VIRGA_HD inline ClippedRange clipToBox(Vec3 o, Vec3 d, Vec3 lo, Vec3 hi, float t
   return {t0, t1};
 }
 
-/// Walks the cells of a majorant grid along o + t d (index coordinates of the fine grid; d of any length) for t in [t0, t1], which
-/// lies in the grid's box: visit(a, b, majorant) for each piece, in order, until it returns false. Returns false if it did.
+/// Walks the cells of a majorant grid along o + t d (index coordinates of the fine grid; d of any length) for t in [t0,
+/// t1], which lies in the grid's box: visit(a, b, majorant) for each piece, in order, until it returns false. Returns
+/// false if it did.
 template <class Visit>
 VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
   const int count[3] = {grid.nx, grid.ny, grid.nz};
@@ -61,8 +62,8 @@ VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0
   return true;
 }
 
-/// Pieces of [t0, t1] along a world-space ray, each with a bound of the density: the grid's cells inside its support, its
-/// background outside. visit(a, b, majorant, inside) until it returns false.
+/// Pieces of [t0, t1] along a world-space ray, each with a bound of the density: the grid's cells inside its support,
+/// its background outside. visit(a, b, majorant, inside) until it returns false.
 template <class Visit>
 VIRGA_HD void forEachMajorant(const GridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
   const ClippedRange in = clipToBox(o, d, grid.supportLo, grid.supportHi, t0, t1);
@@ -84,8 +85,8 @@ struct GridRay {
 
 VIRGA_HD inline float exponential(Pcg32& random) { return -std::log(1 - random.next()); }
 
-/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the medium is
-/// homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
+/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the
+/// medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
 VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
   if (medium.homogeneous) {
     const float t = t0 + exponential(random) / medium.sigmaT;
@@ -117,9 +118,10 @@ VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray,
 /// Below this a transmittance estimate plays Russian roulette.
 inline constexpr float kTransmittanceRoulette = 0.1f;
 
-/// Unbiased estimate of tau(t0, t1), in [0, 1]. Analytic where the medium is homogeneous, otherwise ratio tracking (Novak et al.
-/// 2014) on local majorants.
-VIRGA_HD inline float estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+/// Unbiased estimate of tau(t0, t1), in [0, 1]. Analytic where the medium is homogeneous, otherwise ratio tracking
+/// (Novak et al. 2014) on local majorants.
+VIRGA_HD inline float estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1,
+                                            Pcg32& random) {
   if (medium.homogeneous) return medium.sigmaT > 0 ? std::exp(-medium.sigmaT * (t1 - t0)) : 1;
   const GridRay g(medium, ray);
   float transmittance = 1, depth = exponential(random);

@@ -21,8 +21,9 @@ struct DenseGridView {
     const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
     const int dx = i + 1 < nx ? 1 : 0, dy = j + 1 < ny ? nx : 0, dz = k + 1 < nz ? nx * ny : 0;
-    const float* v = values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) *
-                                  static_cast<size_t>(nx) + static_cast<size_t>(i);
+    const float* v =
+        values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
+        static_cast<size_t>(i);
     const float c00 = lerp(v[0], v[dx], fx), c10 = lerp(v[dy], v[dy + dx], fx);
     const float c01 = lerp(v[dz], v[dz + dx], fx), c11 = lerp(v[dz + dy], v[dz + dy + dx], fx);
     return lerp(lerp(c00, c10, fy), lerp(c01, c11, fy), fz);
@@ -41,8 +42,9 @@ struct RgbGridView {
     const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
     const int dx = i + 1 < nx ? 1 : 0, dy = j + 1 < ny ? nx : 0, dz = k + 1 < nz ? nx * ny : 0;
-    const Rgb* v = values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) *
-                                static_cast<size_t>(nx) + static_cast<size_t>(i);
+    const Rgb* v =
+        values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
+        static_cast<size_t>(i);
     const auto mix = [](Rgb a, Rgb b, float t) { return a + (b - a) * t; };
     const Rgb c00 = mix(v[0], v[dx], fx), c10 = mix(v[dy], v[dy + dx], fx);
     const Rgb c01 = mix(v[dz], v[dz + dx], fx), c11 = mix(v[dz + dy], v[dz + dy + dx], fx);
@@ -81,9 +83,9 @@ struct SparseGridView {
   }
 };
 
-/// A box of coarse cells over a fine grid's support, each with one number: the maximum (majorants) or the mean of what the
-/// trilinear interpolant takes in the part of the cell that lies in the support. The first cell starts where the support
-/// does; the last ones may reach beyond it.
+/// A box of coarse cells over a fine grid's support, each with one number: the maximum (majorants) or the mean of what
+/// the trilinear interpolant takes in the part of the cell that lies in the support. The first cell starts where the
+/// support does; the last ones may reach beyond it.
 struct CoarseGridView {
   const float* values = nullptr;  ///< x fastest
   int nx = 0, ny = 0, nz = 0;
@@ -91,7 +93,8 @@ struct CoarseGridView {
   Vec3 cellSize;  ///< edge lengths, in index coordinates of the fine grid
 
   VIRGA_HD float cell(int i, int j, int k) const {
-    return values[(static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
+    return values[(static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) *
+                      static_cast<size_t>(nx) +
                   static_cast<size_t>(i)];
   }
 };
@@ -103,11 +106,11 @@ struct GridView {
   Kind kind = Kind::constant;
   DenseGridView dense;
   SparseGridView sparse;
-  Vec3 denseOrigin;         ///< index coordinates of the dense box's voxel (0, 0, 0)
+  Vec3 denseOrigin;           ///< index coordinates of the dense box's voxel (0, 0, 0)
   Vec3 supportLo, supportHi;  ///< index coordinates; a `.vol` ends at its box, a VDB one voxel beyond its active voxels
-  float background = 0;     ///< also the value of Kind::constant, everywhere
-  CoarseGridView majorant;  ///< covers the support; absent for Kind::constant
-  CoarseGridView mean;      ///< likewise
+  float background = 0;       ///< also the value of Kind::constant, everywhere
+  CoarseGridView majorant;    ///< covers the support; absent for Kind::constant
+  CoarseGridView mean;        ///< likewise
 
   VIRGA_HD bool supports(Vec3 p) const {
     return p.x >= supportLo.x && p.y >= supportLo.y && p.z >= supportLo.z && p.x <= supportHi.x && p.y <= supportHi.y &&

@@ -11,8 +11,8 @@ namespace {
 
 constexpr const char* kFile = "libvirga_vdb.so";
 
-// Beside the program, where an install puts it, or one folder up from a test; by whole paths, because a sanitizer's dlopen looks
-// along its own.
+// Beside the program, where an install puts it, or one folder up from a test; by whole paths, because a sanitizer's
+// dlopen looks along its own.
 void* openLibrary() {
   std::error_code ignored;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path();

@@ -13,11 +13,13 @@ namespace virga {
 
 /// What needs OpenVDB, which takes longer to load than `virga --help` may run: it lies in a module of its own.
 struct VdbModule {
-  std::shared_ptr<const Grid> (*load)(const AlignedBytes& bytes, const VolumeRequest& request, const GridOptions& options);
+  std::shared_ptr<const Grid> (*load)(const AlignedBytes& bytes, const VolumeRequest& request,
+                                      const GridOptions& options);
   std::vector<GridInfo> (*info)(const AlignedBytes& bytes);
   std::string (*encodeVdb)(const DenseVolume& volume);   ///< a whole `.vdb` file
   std::string (*encodeNvdb)(const DenseVolume& volume);  ///< a whole `.nvdb` file
-  /// Expands one Blosc buffer to exactly `size` bytes; false where it is damaged. Here because OpenVDB brings Blosc along.
+  /// Expands one Blosc buffer to exactly `size` bytes; false where it is damaged. Here because OpenVDB brings Blosc
+  /// along.
   bool (*expandBlosc)(const std::byte* compressed, size_t compressedSize, std::byte* out, size_t size);
 };
 

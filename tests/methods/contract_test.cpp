@@ -151,8 +151,9 @@ TEST(Contract, AStoppedPassLeavesTheFilmAsItWas) {
 
 TEST(Contract, AStopIsHonouredQuickly) {
   // A film of which a pass takes far longer than the test waits.
-  const SceneSnapshot scene = buildScene(edited(edited(description(), "box", "to_world", Matrix4::scaling(3, 3, 3)),
-                                                "cloud", "sigma_t", 20.0), {.filmSize = {{2000, 2000}}});
+  const SceneSnapshot scene =
+      buildScene(edited(edited(description(), "box", "to_world", Matrix4::scaling(3, 3, 3)), "cloud", "sigma_t", 20.0),
+                 {.filmSize = {{2000, 2000}}});
   RenderSession session = sessionOf(scene);
   std::stop_source stop;
   std::atomic<bool> completed{true};

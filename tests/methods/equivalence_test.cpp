@@ -16,8 +16,8 @@ using namespace virga::testing;
 
 constexpr int kSize = 32;
 
-/// Of the difference of two pictures: mean over each quarter, in standard errors, largest in size; and the error of the mean
-/// over all, relative to the picture: what the test can tell.
+/// Of the difference of two pictures: mean over each quarter, in standard errors, largest in size; and the error of the
+/// mean over all, relative to the picture: what the test can tell.
 struct Agreement {
   double worstZ, precision;
 };
@@ -56,18 +56,22 @@ std::string sensor(const std::string& extra = "", double scale = 1, const std::s
                      rotation, scale, kSize, kSize, extra);
 }
 
-constexpr const char* kLamp = R"(<emitter type="point"><point name="position" x="-2" y="3" z="2"/><rgb name="intensity" value="40"/></emitter>)";
-constexpr const char* kGround = R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+constexpr const char* kLamp =
+    R"(<emitter type="point"><point name="position" x="-2" y="3" z="2"/><rgb name="intensity" value="40"/></emitter>)";
+constexpr const char* kGround =
+    R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
   <translate y="-1"/></transform></shape>)";
-constexpr const char* kPhase = R"(<float name="albedo" value="0.9"/><phase type="hg"><float name="g" value="0.4"/></phase>)";
+constexpr const char* kPhase =
+    R"(<float name="albedo" value="0.9"/><phase type="hg"><float name="g" value="0.4"/></phase>)";
 
 std::string homogeneous(double sigmaT, const std::string& attributes = "name=\"interior\"") {
-  return fmt::format(R"(<medium {} type="homogeneous"><float name="sigma_t" value="{}"/>{}</medium>)", attributes, sigmaT, kPhase);
+  return fmt::format(R"(<medium {} type="homogeneous"><float name="sigma_t" value="{}"/>{}</medium>)", attributes,
+                     sigmaT, kPhase);
 }
 
 std::string box(const std::string& medium, const std::string& transform = "", const std::string& bsdf = "null") {
-  return fmt::format(R"(<shape type="cube"><transform name="to_world">{}</transform><bsdf type="{}"/>{}</shape>)", transform, bsdf,
-                     medium);
+  return fmt::format(R"(<shape type="cube"><transform name="to_world">{}</transform><bsdf type="{}"/>{}</shape>)",
+                     transform, bsdf, medium);
 }
 
 /// A medium of density 1 on a constant grid that covers [-1, 1]^3, in a file of the test's own.
@@ -75,29 +79,35 @@ std::string gridMedium(const std::string& format) {
   DenseVolume volume;
   volume.nx = volume.ny = volume.nz = 20;
   volume.values.assign(20 * 20 * 20, 1.f);
-  volume.indexToWorld = Matrix4::translation(-1, -1, -1) * Matrix4::scaling(0.1, 0.1, 0.1) * Matrix4::translation(0.5, 0.5, 0.5);
+  volume.indexToWorld =
+      Matrix4::translation(-1, -1, -1) * Matrix4::scaling(0.1, 0.1, 0.1) * Matrix4::translation(0.5, 0.5, 0.5);
   const std::string file = "constant." + format;
   const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / file;
   if (format == "vol") writeVol(path, volume);
   if (format == "vdb") writeVdb(path, volume);
   if (format == "nvdb") writeNvdb(path, volume);
   const std::string plugin = format == "vol" ? R"(<volume name="sigma_t" type="gridvolume"><transform name="to_world">
-    <scale value="2"/><translate value="-1, -1, -1"/></transform>)" : R"(<volume name="sigma_t" type="vdb">)";
+    <scale value="2"/><translate value="-1, -1, -1"/></transform>)"
+                                             : R"(<volume name="sigma_t" type="vdb">)";
   return fmt::format(R"(<medium name="interior" type="heterogeneous">{}<string name="filename" value="{}"/></volume>
-    <float name="scale" value="2"/>{}</medium>)", plugin, file, kPhase);
+    <float name="scale" value="2"/>{}</medium>)",
+                     plugin, file, kPhase);
 }
 
-// A VDB falls to its background beyond the outermost voxel centres: its picture is of a cube that is smaller by half a voxel.
+// A VDB falls to its background beyond the outermost voxel centres: its picture is of a cube that is smaller by half a
+// voxel.
 const std::string kInnerCube = "<scale value=\"0.95\"/>";
 
 TEST(Equivalence, HomogeneousIsAConstantVol) {
   expectSame(sensor() + kLamp + kGround + box(homogeneous(2)), sensor() + kLamp + kGround + box(gridMedium("vol")));
 }
 TEST(Equivalence, HomogeneousIsAConstantVdb) {
-  expectSame(sensor() + kLamp + kGround + box(homogeneous(2), kInnerCube), sensor() + kLamp + kGround + box(gridMedium("vdb"), kInnerCube));
+  expectSame(sensor() + kLamp + kGround + box(homogeneous(2), kInnerCube),
+             sensor() + kLamp + kGround + box(gridMedium("vdb"), kInnerCube));
 }
 TEST(Equivalence, HomogeneousIsAConstantNanoVdb) {
-  expectSame(sensor() + kLamp + kGround + box(homogeneous(2), kInnerCube), sensor() + kLamp + kGround + box(gridMedium("nvdb"), kInnerCube));
+  expectSame(sensor() + kLamp + kGround + box(homogeneous(2), kInnerCube),
+             sensor() + kLamp + kGround + box(gridMedium("nvdb"), kInnerCube));
 }
 TEST(Equivalence, ADifferenceOfFivePercentIsNoticed) {
   const std::string world = sensor() + kLamp + kGround;
@@ -109,7 +119,8 @@ TEST(Equivalence, CameraInsideIsCameraOutsideWithTheBoundaryMoved) {
   const std::string near = R"(<float name="near_clip" value="1"/>)";
   const std::string around = box(homogeneous(0.3), R"(<scale value="9"/>)");
   const std::string fog = homogeneous(0.3, "id=\"fog\"");
-  const std::string lamp = R"(<shape type="sphere"><point name="center" x="-1" y="2" z="0"/><float name="radius" value="0.3"/>
+  const std::string lamp =
+      R"(<shape type="sphere"><point name="center" x="-1" y="2" z="0"/><float name="radius" value="0.3"/>
     <emitter type="area"><rgb name="radiance" value="60"/></emitter></shape>)";
   expectSame(sensor(near) + lamp + kGround + around,
              fog + sensor(near + R"(<ref name="medium" id="fog"/>)") + lamp + kGround +
@@ -120,7 +131,8 @@ TEST(Equivalence, NestedIsFlattened) {
   // An inner box that replaces, of the same medium, is no box at all.
   const std::string fog = homogeneous(1.5, "id=\"fog\"");
   const std::string outer = box(R"(<ref name="interior" id="fog"/>)");
-  const std::string inner = box(R"(<ref name="interior" id="fog"/><ref name="exterior" id="fog"/>)", R"(<scale value="0.5"/>)");
+  const std::string inner =
+      box(R"(<ref name="interior" id="fog"/><ref name="exterior" id="fog"/>)", R"(<scale value="0.5"/>)");
   expectSame(fog + sensor() + kLamp + kGround + outer, fog + sensor() + kLamp + kGround + outer + inner);
 }
 
@@ -131,14 +143,16 @@ TEST(Equivalence, OverlappingVolumesAdd) {
 
 TEST(Equivalence, TouchingBoxesAreOneBox) {
   const std::string half = homogeneous(2);
-  expectSame(sensor() + kLamp + kGround + box(half),
-             sensor() + kLamp + kGround + box(half, R"(<scale x="0.5"/><translate x="-0.5"/>)") +
-                 box(half, R"(<scale x="0.5"/><translate x="0.5"/>)"));
+  expectSame(sensor() + kLamp + kGround + box(half), sensor() + kLamp + kGround +
+                                                         box(half, R"(<scale x="0.5"/><translate x="-0.5"/>)") +
+                                                         box(half, R"(<scale x="0.5"/><translate x="0.5"/>)"));
 }
 
-// The boxes above stand exactly on the ground; here the ground is half a unit higher in one picture and the box is cut in the other.
+// The boxes above stand exactly on the ground; here the ground is half a unit higher in one picture and the box is cut
+// in the other.
 TEST(Equivalence, AMediumBelowTheGroundIsNotSeen) {
-  const std::string ground = R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
+  const std::string ground =
+      R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/>
     <translate y="-0.5"/></transform></shape>)";
   expectSame(sensor() + kLamp + ground + box(homogeneous(2)),
              sensor() + kLamp + ground + box(homogeneous(2), R"(<scale y="0.75"/><translate y="0.25"/>)"));
@@ -152,8 +166,8 @@ TEST(Equivalence, AMeshBoundaryIsACubeHoweverItIsWound) {
   std::fclose(file);
   const std::string world = sensor() + kLamp + kGround;
   const auto mesh = [&](const std::string& transform) {
-    return R"(<shape type="obj"><string name="filename" value="cube.obj"/><bsdf type="null"/><transform name="to_world">)" + transform +
-           "</transform>" + homogeneous(2) + "</shape>";
+    return R"(<shape type="obj"><string name="filename" value="cube.obj"/><bsdf type="null"/><transform name="to_world">)" +
+           transform + "</transform>" + homogeneous(2) + "</shape>";
   };
   expectSame(world + box(homogeneous(2)), world + mesh(""));
   expectSame(world + box(homogeneous(2)), world + mesh(R"(<scale x="-1"/>)"));
@@ -163,7 +177,8 @@ TEST(Equivalence, GlassOfIndexOneIsANullBoundary) {
   // The point light reaches nothing through the glass by connection: an environment is met by chance and serves both.
   const std::string sky = R"(<emitter type="constant"/>)";
   const std::string glass = R"(<shape type="sphere"><bsdf type="dielectric"><float name="int_ior" value="1.5"/>
-    <float name="ext_ior" value="1.5"/></bsdf>)" + homogeneous(2) + "</shape>";
+    <float name="ext_ior" value="1.5"/></bsdf>)" +
+                            homogeneous(2) + "</shape>";
   const std::string null = R"(<shape type="sphere"><bsdf type="null"/>)" + homogeneous(2) + "</shape>";
   expectSame(sensor() + sky + kGround + null, sensor() + sky + kGround + glass);
 }
@@ -172,10 +187,11 @@ TEST(Equivalence, RotatingTheWorldChangesNothing) {
   const std::string turn = R"(<rotate x="0.3" y="0.8" z="-0.5" angle="77"/>)";
   const auto world = [&](const std::string& rotation) {
     return sensor("", 1, rotation) +
-           R"(<emitter type="spot"><transform name="to_world"><lookat origin="-2, 3, 2" target="0, 0, 0" up="0, 1, 0"/>)" + rotation +
+           R"(<emitter type="spot"><transform name="to_world"><lookat origin="-2, 3, 2" target="0, 0, 0" up="0, 1, 0"/>)" +
+           rotation +
            R"(</transform><rgb name="intensity" value="60"/></emitter><shape type="rectangle"><transform name="to_world">
-           <scale value="4"/><rotate x="1" angle="-90"/><translate y="-1"/>)" + rotation + "</transform></shape>" +
-           box(homogeneous(2), rotation);
+           <scale value="4"/><rotate x="1" angle="-90"/><translate y="-1"/>)" +
+           rotation + "</transform></shape>" + box(homogeneous(2), rotation);
   };
   expectSame(world(""), world(turn));
 }
@@ -184,9 +200,12 @@ TEST(Equivalence, ScalingTheWorldChangesNothing) {
   // By s, with coefficients by 1/s and the point light's intensity by s^2.
   const auto world = [&](double s) {
     const std::string scale = fmt::format(R"(<scale value="{}"/>)", s);
-    const std::string clip = fmt::format(R"(<float name="near_clip" value="{}"/><float name="far_clip" value="{}"/>)", 0.01 * s, 1e4 * s);
-    return sensor(clip, s) + fmt::format(R"(<emitter type="point"><point name="position" x="{}" y="{}" z="{}"/>
-      <rgb name="intensity" value="{}"/></emitter>)", -2 * s, 3 * s, 2 * s, 40 * s * s) +
+    const std::string clip =
+        fmt::format(R"(<float name="near_clip" value="{}"/><float name="far_clip" value="{}"/>)", 0.01 * s, 1e4 * s);
+    return sensor(clip, s) +
+           fmt::format(R"(<emitter type="point"><point name="position" x="{}" y="{}" z="{}"/>
+      <rgb name="intensity" value="{}"/></emitter>)",
+                       -2 * s, 3 * s, 2 * s, 40 * s * s) +
            R"(<shape type="rectangle"><transform name="to_world"><scale value="4"/><rotate x="1" angle="-90"/><translate y="-1"/>)" +
            scale + "</transform></shape>" + box(homogeneous(2 / s), scale);
   };
@@ -195,14 +214,17 @@ TEST(Equivalence, ScalingTheWorldChangesNothing) {
 }
 
 TEST(Equivalence, EquiangularSamplingChangesNothing) {
-  const std::string fog = homogeneous(0.5, "id=\"fog\"") + sensor(R"(<ref name="medium" id="fog"/>)") + kGround +
-                          R"(<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+  const std::string fog =
+      homogeneous(0.5, "id=\"fog\"") + sensor(R"(<ref name="medium" id="fog"/>)") + kGround +
+      R"(<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
                           <translate y="1.5"/></transform><emitter type="area"><rgb name="radiance" value="20"/></emitter></shape>
                           <shape type="sphere"><point name="center" x="1" y="0" z="0"/><float name="radius" value="0.2"/>
                           <emitter type="area"><rgb name="radiance" value="20"/></emitter></shape>)";
   const SceneSnapshot scene = sceneOf(fog);
   const auto with = [&](const char* equiangular, uint64_t seed) {
-    return rendered(scene, {.passes = 1536, .seed = seed, .settings = {{"equiangular_depth", equiangular}}}).film().beauty();
+    return rendered(scene, {.passes = 1536, .seed = seed, .settings = {{"equiangular_depth", equiangular}}})
+        .film()
+        .beauty();
   };
   const Agreement result = agreement(with("8", 1), with("0", 2));
   EXPECT_LT(result.worstZ, 3.5);

@@ -16,7 +16,8 @@ constexpr const char* kSensor = R"(<sensor type="perspective"><float name="fov" 
 
 std::string cloud(const std::string& albedo, const std::string& g = "0.7") {
   return R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
-    <float name="albedo" value=")" + albedo + R"("/><phase type="hg"><float name="g" value=")" + g + R"("/></phase></medium></shape>)";
+    <float name="albedo" value=")" +
+         albedo + R"("/><phase type="hg"><float name="g" value=")" + g + R"("/></phase></medium></shape>)";
 }
 
 // Mean radiance, to within its standard error.
@@ -34,7 +35,8 @@ TEST(Furnace, EmptySceneIsWhite) { expectWhite(""); }
 TEST(Furnace, MediumIsWhite) { expectWhite(cloud("1")); }
 TEST(Furnace, BackwardMediumIsWhite) { expectWhite(cloud("1", "-0.8")); }
 TEST(Furnace, CornetteShanksIsWhite) {
-  expectWhite(R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
+  expectWhite(
+      R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
     <float name="albedo" value="1"/><phase type="cornette_shanks"><float name="g" value="0.5"/></phase></medium></shape>)");
 }
 TEST(Furnace, DiffuseObjectsAreWhite) {
@@ -43,7 +45,8 @@ TEST(Furnace, DiffuseObjectsAreWhite) {
     <bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>)");
 }
 TEST(Furnace, GlassAndMirrorAreWhite) {
-  expectWhite(R"(<shape type="sphere"><transform name="to_world"><translate x="-0.8"/></transform><bsdf type="dielectric"/></shape>
+  expectWhite(
+      R"(<shape type="sphere"><transform name="to_world"><translate x="-0.8"/></transform><bsdf type="dielectric"/></shape>
     <shape type="sphere"><point name="center" x="1.2" y="0" z="0"/><bsdf type="conductor"><string name="material" value="none"/>
     </bsdf></shape>)");
 }

@@ -49,7 +49,8 @@ std::string pinpointSensor(const std::string& origin, const std::string& target,
   return fmt::format(R"(<sensor type="perspective" id="camera"><float name="fov" value="0.001"/>
     <transform name="to_world"><lookat origin="{}" target="{}" up="{}"/></transform>
     <film type="hdrfilm"><integer name="width" value="{}"/><integer name="height" value="{}"/><rfilter type="box"/></film>
-    {}</sensor>)", origin, target, up, size, size, extra);
+    {}</sensor>)",
+                     origin, target, up, size, size, extra);
 }
 
 }  // namespace virga::testing

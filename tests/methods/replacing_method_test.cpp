@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A method that refines one picture instead of averaging many: the other half of the contract, which `path` does not use.
+// A method that refines one picture instead of averaging many: the other half of the contract, which `path` does not
+// use.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -11,8 +12,8 @@ namespace {
 
 using namespace virga::testing;
 
-/// Relaxes toward a grey of `target`, half the way with each pass, as an iterative solver would. Keeps its solution when the
-/// camera moves, not when a light does. Its passes depend on their order, so it has a state to save.
+/// Relaxes toward a grey of `target`, half the way with each pass, as an iterative solver would. Keeps its solution
+/// when the camera moves, not when a light does. Its passes depend on their order, so it has a state to save.
 class Relaxation final : public Method {
  public:
   void prepare(SceneSnapshot, const Settings&, LayerMask) override {}
@@ -42,15 +43,18 @@ class Relaxation final : public Method {
   float value_ = 0;
 };
 
-const MethodInfo kRelaxation{"relaxation", "for tests", "none", LayerMask::none().with(Layer::mediaToMedia), Accuracy::biased, {},
-                             [] { return std::unique_ptr<Method>(std::make_unique<Relaxation>()); }};
+const MethodInfo kRelaxation{
+    "relaxation", "for tests", "none", LayerMask::none().with(Layer::mediaToMedia), Accuracy::biased, {}, [] {
+      return std::unique_ptr<Method>(std::make_unique<Relaxation>());
+    }};
 
 SceneSnapshot anyScene() {
   return sceneOf(pinpointSensor("0, 0, 5", "0, 0, 0", "0, 1, 0", 4) + R"(<emitter type="constant" id="sky"/>)");
 }
 
 RenderSession sessionAfter(int passes) {
-  RenderSession session(anyScene(), kRelaxation, {.settings = {}, .layers = LayerMask::none().with(Layer::mediaToMedia)});
+  RenderSession session(anyScene(), kRelaxation,
+                        {.settings = {}, .layers = LayerMask::none().with(Layer::mediaToMedia)});
   for (int i = 0; i < passes; ++i) session.step();
   return session;
 }

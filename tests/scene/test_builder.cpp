@@ -285,14 +285,18 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
 TEST(Builder, WhatMakesAPictureBlackIsWarnedOf) {
   EXPECT_EQ(test::build("<shape type=\"sphere\"/>")->warnings,
             std::vector<std::string>{"warning: the scene has no emitter that shines: its picture is black"});
-  EXPECT_EQ(test::build("<emitter type=\"point\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")->warnings.size(), 1u);
-  EXPECT_TRUE(test::build("<emitter type=\"constant\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")->warnings.empty());
+  EXPECT_EQ(test::build("<emitter type=\"point\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")
+                ->warnings.size(),
+            1u);
+  EXPECT_TRUE(test::build("<emitter type=\"constant\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")
+                  ->warnings.empty());
 }
 
 TEST(Builder, ObjectsThatAreOnlyReferredToMayStandAnywhere) {
   const SceneSnapshot scene = test::build(
       "<emitter type=\"area\" id=\"glow\"/><phase type=\"hg\" id=\"forward\"><float name=\"g\" value=\"0.5\"/></phase>"
-      "<shape type=\"sphere\"><ref id=\"glow\"/></shape><shape type=\"cube\"><bsdf type=\"null\"/><medium name=\"interior\" "
+      "<shape type=\"sphere\"><ref id=\"glow\"/></shape><shape type=\"cube\"><bsdf type=\"null\"/><medium "
+      "name=\"interior\" "
       "type=\"homogeneous\"><ref id=\"forward\"/></medium></shape>");
   EXPECT_EQ(scene->view.emitters.size, 1);
   EXPECT_EQ(scene->view.media[0].phase.g(), 0.5f);

@@ -55,7 +55,8 @@ class PathMethod final : public Method {
   LayerRadiance tracePixel(const PathTracer<EmbreeRays>& tracer, int x, int y, const SampleId& id) const {
     Sampler sampler(id);
     const Vec2 offset = scene_->filter.sample(sampler.next2D());
-    const CameraRay ray = scene_->camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+    const CameraRay ray =
+        scene_->camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
     return tracer.trace(ray, distance(ray.ray.o, scene_->camera.toWorld.translation), sampler);
   }
 

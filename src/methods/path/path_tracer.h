@@ -10,8 +10,8 @@
 namespace virga {
 
 struct PathOptions {
-  int maxDepth = -1;  ///< segments; -1: no limit
-  int rrDepth = 5;    ///< scattering events before Russian roulette
+  int maxDepth = -1;         ///< segments; -1: no limit
+  int rrDepth = 5;           ///< scattering events before Russian roulette
   int equiangularDepth = 1;  ///< segments on which technique B aims at large lights, too; at small ones it always does
 };
 
@@ -19,8 +19,8 @@ struct PathOptions {
 ///
 /// Techniques for the light at a medium vertex, weighted against each other by the power heuristic:
 ///   A  free flight to the vertex, then a point on a light;
-///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite distance);
-///   C  free flight to the vertex, then the phase function, which meets the light.
+///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite
+///   distance); C  free flight to the vertex, then the phase function, which meets the light.
 /// At a surface vertex: A' a point on a light, C' the BSDF.
 template <class Rays>
 class PathTracer {
@@ -64,9 +64,9 @@ class PathTracer {
   /// The side of a surface that a ray arrives on.
   struct Side {
     const Bsdf* bsdf;
-    Frame frame;      ///< around the shading normal; turned over for the back of a two-sided bsdf
-    Vec3 wo;          ///< local
-    Vec3 normal;      ///< geometric, on the frame's side
+    Frame frame;  ///< around the shading normal; turned over for the back of a two-sided bsdf
+    Vec3 wo;      ///< local
+    Vec3 normal;  ///< geometric, on the frame's side
 
     /// Shading and true normal disagree about which side a direction is on: light would leak through the surface.
     VIRGA_HD bool leaks(Vec3 world, Vec3 local) const { return dot(world, normal) * local.z <= 0; }
@@ -137,7 +137,8 @@ class PathTracer {
     const EmitterView& emitter = scene_.emitters[scene_.environment];
     const Vec3 w = path.at.ray.d;
     const float connection = scene_.emitterChoice.probability(scene_.environment) * environmentPdf(emitter, w);
-    path.add(path.layers, environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
+    path.add(path.layers,
+             environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
   }
 
   VIRGA_HD void addAreaLight(Path& path, const SurfacePoint& point) const {
@@ -163,8 +164,9 @@ class PathTracer {
 
   // --- next-event estimation ---
 
-  /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way. `r` starts
-  /// at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it is expected to.
+  /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way.
+  /// `r` starts at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it
+  /// is expected to.
   VIRGA_HD float visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
     float tMax = kInfinity;
     if (!std::isinf(light.distance)) {
@@ -191,10 +193,13 @@ class PathTracer {
     return {sampleLight(scene_, scene_.emitters[choice.index], x, u), choice.index, choice.probability};
   }
 
-  VIRGA_HD bool hasLights() const { return scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0; }
+  VIRGA_HD bool hasLights() const {
+    return scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
+  }
 
   /// Technique B: a vertex on the segment by its angle about a point on a light, connected to that point.
-  VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media, Sampler& sampler) const {
+  VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media,
+                                   Sampler& sampler) const {
     if (!hasLights()) return;
     const auto choice = scene_.emitterChoice.sample(one(path, sampler));
     const EmitterView& emitter = scene_.emitters[choice.index];
@@ -227,7 +232,8 @@ class PathTracer {
   }
 
   /// Technique A at a medium vertex.
-  VIRGA_HD void connectMedium(Path& path, const MediumView& medium, const MediaState& media, Vec3 x, Vec3 wo, Sampler& sampler) const {
+  VIRGA_HD void connectMedium(Path& path, const MediumView& medium, const MediaState& media, Vec3 x, Vec3 wo,
+                              Sampler& sampler) const {
     if (!hasLights()) return;
     const Connection c = sampleConnection(path, x, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
@@ -288,7 +294,8 @@ class PathTracer {
     const bool back = surface.twoSided && dot(wo, point.geometricNormal) < 0;
     const Vec3 n = back ? -point.shadingNormal : point.shadingNormal;
     const Frame frame(n);
-    return {back ? &surface.back : &surface.front, frame, frame.toLocal(wo), back ? -point.geometricNormal : point.geometricNormal};
+    return {back ? &surface.back : &surface.front, frame, frame.toLocal(wo),
+            back ? -point.geometricNormal : point.geometricNormal};
   }
 
   VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {

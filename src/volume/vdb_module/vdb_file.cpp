@@ -25,7 +25,6 @@
 namespace virga {
 namespace {
 
-
 constexpr uint32_t kOldestVersion = 222;
 
 void initialiseOnce() {
@@ -378,6 +377,7 @@ std::string encodeNvdb(const DenseVolume& volume) {
 }  // namespace virga
 
 extern "C" __attribute__((visibility("default"))) const virga::VdbModule& virgaVdbModule() {
-  static constexpr virga::VdbModule kModule{virga::loadVdb, virga::vdbInfo, virga::encodeVdb, virga::encodeNvdb, virga::expandBlosc};
+  static constexpr virga::VdbModule kModule{virga::loadVdb, virga::vdbInfo, virga::encodeVdb, virga::encodeNvdb,
+                                            virga::expandBlosc};
   return kModule;
 }
