@@ -8,6 +8,7 @@
 #include "app/ready_scene.h"
 #include "app/usage_error.h"
 #include "core/atomic_write.h"
+#include "core/error.h"
 #include "volume/procedural.h"
 #include "volume/volume_io.h"
 
@@ -48,10 +49,17 @@ fs::path numbered(const fs::path& file, int number) {
   return out.replace_extension(fmt::format(".{:04}{}", number, file.extension().string()));
 }
 
-void writeScene(const Plan& plan, const fs::path& firstVolume, bool isSequence) {
+// The volume of a scene is not named on the command line: one that was there before, without the scene, is somebody's.
+void requireOwnVolume(const MakeOptions& options, const Plan& plan, const fs::path& firstVolume) {
+  if (plan.scene != fs::path(options.output) || !fs::exists(firstVolume) || fs::exists(plan.scene)) return;
+  throw Error(fmt::format("\"{}\" exists and would be overwritten", firstVolume.string()),
+              {.position = {}, .hint = "name both: -o VOLUME --scene SCENE.xml", .notes = {}});
+}
+
+void writeScene(const Plan& plan, std::vector<std::string> frames, bool isSequence) {
   const fs::path folder = plan.scene.has_parent_path() ? plan.scene.parent_path() : fs::path(".");
   const fs::path relative = fs::proximate(plan.volume, folder);
-  const ReadyScene scene{.volume = firstVolume, .nameInScene = relative, .isSequence = isSequence};
+  const ReadyScene scene{.frames = std::move(frames), .nameInScene = relative, .isSequence = isSequence};
   writeAtomically(plan.scene, readySceneXml(scene));
   fmt::print(stderr, "wrote {}\n", plan.scene.string());
 }
@@ -64,15 +72,18 @@ int make(const MakeOptions& options) {
   const Writer write = writerFor(plan.volume);
   const bool isSequence = options.frames > 0;
   const auto fileOf = [&](int frame) { return isSequence ? numbered(plan.volume, frame + 1) : plan.volume; };
+  requireOwnVolume(options, plan, fileOf(0));
   checkWritable(fileOf(0));
   if (!plan.scene.empty()) checkWritable(plan.scene);
+  std::vector<std::string> files;
   for (int frame = 0; frame < std::max(1, options.frames); ++frame) {
     const ProceduralSettings settings{
         .resolution = options.resolution, .seed = options.seed, .frame = static_cast<float>(frame)};
-    write(fileOf(frame), makeProcedural(kind, settings));
-    fmt::print(stderr, "wrote {}\n", fileOf(frame).string());
+    files.push_back(fileOf(frame).string());
+    write(files.back(), makeProcedural(kind, settings));
+    fmt::print(stderr, "wrote {}\n", files.back());
   }
-  if (!plan.scene.empty()) writeScene(plan, fileOf(0), isSequence);
+  if (!plan.scene.empty()) writeScene(plan, std::move(files), isSequence);
   return 0;
 }
 

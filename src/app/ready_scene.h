@@ -3,14 +3,15 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace virga::app {
 
 /// A scene to start from: the volume, a light from the side, a ground and a camera.
 struct ReadyScene {
-  std::filesystem::path volume;  ///< the file to look at; of a sequence, the first
-  std::filesystem::path
-      nameInScene;          ///< as the scene is to name it: relative to the scene's folder, without the number
+  std::vector<std::string> frames;  ///< the volume's file, or those of a sequence: all of them must fit the picture
+  /// As the scene is to name it: relative to the scene's folder, without the number.
+  std::filesystem::path nameInScene;
   bool isSequence = false;  ///< then the scene has a variable: -D frame=0012
 };
 

@@ -12,14 +12,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The value that a parameter has: given, or the method's default.
-std::map<std::string, std::string> effectiveSettings(const RenderSession& session) {
-  std::map<std::string, std::string> out;
-  for (const SettingInfo& s : session.info().settings) out[std::string(s.name)] = std::string(s.defaultValue);
-  for (const auto& [name, value] : session.settings().values) out[name] = value;
-  return out;
-}
-
 // A method may turn out biased by a setting that its registry row knows nothing of.
 std::string_view biasClass(const RenderSession& session, const LoopOutcome& outcome) {
   const Accuracy accuracy = session.info().accuracy;
@@ -32,7 +24,7 @@ Metadata metadata(const RenderSession& session, const LoopOutcome& outcome, cons
   m["virga.scene"] = sceneFile;
   m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
   m["virga.method"] = std::string(session.info().name);
-  for (const auto& [name, value] : effectiveSettings(session))
+  for (const auto& [name, value] : session.method().settingsInForce())
     m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
   m["virga.seed"] = std::to_string(session.settings().seed);
   m["virga.passes"] = session.film().passes();
@@ -70,7 +62,7 @@ Json sceneJson(const RenderSession& session, const std::string& file) {
 Json methodJson(const RenderSession& session, const LoopOutcome& outcome) {
   return {{"name", session.info().name},
           {"bias", biasClass(session, outcome)},
-          {"settings", effectiveSettings(session)},
+          {"settings", session.method().settingsInForce()},
           {"seed", session.settings().seed}};
 }
 

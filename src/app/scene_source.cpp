@@ -47,15 +47,18 @@ bool isVolumeFile(const std::string& path) {
   return extension == ".vdb" || extension == ".nvdb" || extension == ".vol";
 }
 
-SceneDescription sceneAroundVolume(const std::string& file) {
-  const std::vector<GridInfo> grids = listGrids(file);
-  const GridInfo& density = densityOf(file, grids);
-  const bool isVol = std::filesystem::path(file).extension() == ".vol";
-  return describeBareVolume({.file = file,
-                             .grid = grids.size() > 1 ? density.name : "",
-                             .worldBounds = density.worldBounds,
-                             .maximumDensity = density.maximum,
-                             .meanDensity = isVol ? meanOfNonZero(file) : density.mean});
+SceneDescription sceneAroundVolume(const std::vector<std::string>& frames) {
+  BareVolume all{.file = frames.front()};
+  for (const std::string& file : frames) {
+    const std::vector<GridInfo> grids = listGrids(file);
+    const GridInfo& density = densityOf(file, grids);
+    const bool isVol = std::filesystem::path(file).extension() == ".vol";
+    if (&file == &frames.front() && grids.size() > 1) all.grid = density.name;
+    all.worldBounds.extend(density.worldBounds);
+    all.maximumDensity = std::max(all.maximumDensity, density.maximum);
+    all.meanDensity += (isVol ? meanOfNonZero(file) : density.mean) / static_cast<float>(frames.size());
+  }
+  return describeBareVolume(all);
 }
 
 SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>& warnings) {
@@ -64,7 +67,7 @@ SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>
                           {.defines = options.defines, .lenient = options.lenient, .warnings = &warnings});
   if (!options.defines.empty())
     throw Error(fmt::format("-D has no meaning for \"{}\": a volume has no variables", options.file));
-  return sceneAroundVolume(options.file);
+  return sceneAroundVolume({options.file});
 }
 
 }  // namespace virga::app

@@ -12,9 +12,9 @@ namespace virga::app {
 /// A scene file, or a bare volume in a ready scene. Warnings are full texts. Throws Error.
 SceneDescription loadScene(const SceneOptions&, std::vector<std::string>& warnings);
 
-/// A ready scene around the volume: of several grids, "density" or the first that can be loaded. Throws Error where
-/// there is none.
-SceneDescription sceneAroundVolume(const std::string& file);
+/// A ready scene around a volume, or around all frames of a sequence (it names the first): of several grids, "density"
+/// or the first that can be loaded. Throws Error where there is none.
+SceneDescription sceneAroundVolume(const std::vector<std::string>& frames);
 
 /// ".vdb", ".nvdb" or ".vol".
 bool isVolumeFile(const std::string& path);

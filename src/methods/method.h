@@ -51,9 +51,12 @@ struct Overlay {
   std::vector<Dot> dots;
 };
 
+/// Values of a method's parameters as text, by name without the method's prefix.
+using SettingValues = std::map<std::string, std::string, std::less<>>;
+
 /// Parameters of a method (`--set path.max_depth=8`) and the numbers that fix its randomness.
 struct Settings {
-  std::map<std::string, std::string, std::less<>> values;  ///< keys without the method's prefix
+  SettingValues values;
   uint64_t seed = 0;
 };
 
@@ -77,6 +80,9 @@ class Method {
   /// Fills the whole frame with pass `index` (0, 1, ...; it belongs to replicate index % Film::kReplicates). Returns
   /// within 20 ms of a stop request.
   virtual PassResult pass(int64_t index, const Budget&, std::stop_token, PassFrame&) = 0;
+
+  /// Every parameter of the registry's row with the value that is in force, wherever it came from.
+  virtual SettingValues settingsInForce() const = 0;
 
   virtual Overlay overlay() const { return {}; }
   /// Everything besides (snapshot, settings, film) that later passes depend on; empty for methods with pure passes.

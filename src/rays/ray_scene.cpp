@@ -2,6 +2,7 @@
 #include "rays/ray_scene.h"
 
 #include <embree3/rtcore.h>
+#include <fmt/format.h>
 
 #include <variant>
 
@@ -90,6 +91,15 @@ struct DeviceHolder {
 RTCDevice device() {
   static DeviceHolder holder;
   return holder.device;
+}
+
+// Embree reports through the device, not by what its functions return.
+void requireNoError() {
+  const RTCError error = rtcGetDeviceError(device());
+  if (error == RTC_ERROR_OUT_OF_MEMORY)
+    throw Error("not enough memory to sort the scene's triangles for ray queries", {{}, "use simpler meshes", {}});
+  if (error != RTC_ERROR_NONE)
+    throw Error(fmt::format("Embree, which traces the rays, failed (its error {})", static_cast<int>(error)));
 }
 
 }  // namespace
@@ -258,6 +268,7 @@ RayScene::RayScene(std::vector<std::shared_ptr<const RayShape>> shapes)
     rtcAttachGeometryByID(impl_->scene, shape.geometry, static_cast<unsigned>(i));
   }
   rtcCommitScene(impl_->scene);
+  requireNoError();
 }
 
 RayScene::~RayScene() = default;

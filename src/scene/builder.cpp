@@ -107,15 +107,10 @@ NodePtr onlyChild(PluginReader& reader, std::string_view tag) {
 std::filesystem::path BuildContext::file(PluginReader& reader, std::string_view parameter) const {
   const std::string name = reader.text(parameter, "");
   if (name.empty()) reader.fail(parameter, fmt::format("\"{}\" is missing", parameter));
-  const std::filesystem::path path(name);
-  std::error_code ignored;
-  if (path.is_absolute() && std::filesystem::exists(path, ignored)) return path;
+  if (const auto found = findFile(description, name)) return *found;
   std::vector<std::string> tried;
-  if (!path.is_absolute())
-    for (const auto& directory : description.searchPaths) {
-      if (std::filesystem::exists(directory / path, ignored)) return directory / path;
-      tried.push_back("looked in " + directory.string());
-    }
+  if (!std::filesystem::path(name).is_absolute())
+    for (const auto& directory : description.searchPaths) tried.push_back("looked in " + directory.string());
   reader.fail(parameter, fmt::format("file \"{}\" not found", name), "", tried);
 }
 

@@ -204,6 +204,14 @@ NodePtr findNode(const SceneDescription& scene, std::string_view id) {
   return found;
 }
 
+std::optional<std::filesystem::path> findFile(const SceneDescription& scene, const std::filesystem::path& name) {
+  std::error_code ignored;
+  if (name.is_absolute()) return std::filesystem::exists(name, ignored) ? std::optional(name) : std::nullopt;
+  for (const std::filesystem::path& folder : scene.searchPaths)
+    if (std::filesystem::exists(folder / name, ignored)) return folder / name;
+  return std::nullopt;
+}
+
 SceneDescription edited(const SceneDescription& scene, std::string_view nodeId, std::string_view property,
                         Value value) {
   const NodePtr target = findNode(scene, nodeId);

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -51,6 +52,9 @@ struct SceneDescription {
 
 /// The node with that id, or null.
 NodePtr findNode(const SceneDescription&, std::string_view id);
+
+/// The file that the description means by `name`: absolute, or along the search paths. Nothing where there is none.
+std::optional<std::filesystem::path> findFile(const SceneDescription&, const std::filesystem::path& name);
 
 /// A copy in which one parameter of one node has another value (added where it was absent). All nodes that the edit
 /// does not reach are shared with the original. Throws Error for an unknown id.

@@ -6,8 +6,6 @@
 #include <set>
 #include <vector>
 
-#include "core/random.h"
-
 namespace virga {
 namespace {
 
@@ -144,12 +142,6 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
   for (const Crossing& c : around)
     if (c.t < base.t) enter(c);
   return state;
-}
-
-uint64_t contentHash(const SceneDescription& description) {
-  uint64_t h = 0;
-  for (const char c : toXml(description)) h = hash64(h ^ static_cast<unsigned char>(c));
-  return h;
 }
 
 }  // namespace virga

@@ -74,7 +74,8 @@ ChangeSet differences(const SceneDescription& before, const SceneDescription& af
 /// of null boundaries, or of the innermost shape that replaces.
 MediaState mediaAt(const Scene&, Vec3 p);
 
-/// 64 bits of everything that the description says, for metadata.
+/// 64 bits of everything that the description says and of the contents of the files that it names (not of where they
+/// lie), for metadata. Reads those files.
 uint64_t contentHash(const SceneDescription&);
 
 }  // namespace virga

@@ -85,16 +85,14 @@ struct GridRay {
 
 VIRGA_HD inline float exponential(Pcg32& random) { return -std::log(1 - random.next()); }
 
-/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the
-/// medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
-VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
-  if (medium.homogeneous) {
-    const float t = t0 + exponential(random) / medium.sigmaT;
-    return t < t1 ? t : kInfinity;
-  }
+/// Tentative collisions along [t0, t1] of a heterogeneous medium: a Poisson process of density majorant * sigmaT.
+/// visit(t, ratio) until it returns false; `ratio` in [0, 1] is the density at t over the majorant there, the part of
+/// collisions that are real.
+template <class Visit>
+VIRGA_HD void forEachTentativeCollision(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random,
+                                        Visit&& visit) {
   const GridRay g(medium, ray);
-  float depth = exponential(random);  // optical depth left until the next tentative collision
-  float found = kInfinity;
+  float depth = exponential(random);  // optical depth left until the next one
   forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
     const float mu = majorant * medium.sigmaT;
     for (float t = a;;) {
@@ -104,13 +102,24 @@ VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray,
         return true;
       }
       t += depth / mu;
-      const float density = inside ? medium.density.lookupInside(g.o + g.d * t) : majorant;
-      if (random.next() * majorant < density) {
-        found = t;
-        return false;
-      }
+      if (!visit(t, inside ? medium.density.lookupInside(g.o + g.d * t) / majorant : 1.f)) return false;
       depth = exponential(random);
     }
+  });
+}
+
+/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the
+/// medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
+VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+  if (medium.homogeneous) {
+    const float t = t0 + exponential(random) / medium.sigmaT;
+    return t < t1 ? t : kInfinity;
+  }
+  float found = kInfinity;
+  forEachTentativeCollision(medium, ray, t0, t1, random, [&](float t, float ratio) {
+    const bool real = random.next() < ratio;
+    if (real) found = t;
+    return !real;
   });
   return found;
 }
@@ -123,28 +132,13 @@ inline constexpr float kTransmittanceRoulette = 0.1f;
 VIRGA_HD inline float estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1,
                                             Pcg32& random) {
   if (medium.homogeneous) return medium.sigmaT > 0 ? std::exp(-medium.sigmaT * (t1 - t0)) : 1;
-  const GridRay g(medium, ray);
-  float transmittance = 1, depth = exponential(random);
-  forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
-    const float mu = majorant * medium.sigmaT;
-    for (float t = a;;) {
-      const float here = (b - t) * mu;
-      if (!(depth < here)) {
-        depth -= here;
-        return true;
-      }
-      t += depth / mu;
-      const float density = inside ? medium.density.lookupInside(g.o + g.d * t) : majorant;
-      transmittance *= 1 - density / majorant;
-      if (transmittance < kTransmittanceRoulette) {
-        if (!(random.next() * kTransmittanceRoulette < transmittance)) {
-          transmittance = 0;
-          return false;
-        }
-        transmittance = kTransmittanceRoulette;
-      }
-      depth = exponential(random);
-    }
+  float transmittance = 1;
+  forEachTentativeCollision(medium, ray, t0, t1, random, [&](float, float ratio) {
+    transmittance *= 1 - ratio;
+    if (transmittance >= kTransmittanceRoulette) return true;
+    const bool survives = random.next() * kTransmittanceRoulette < transmittance;
+    transmittance = survives ? kTransmittanceRoulette : 0;
+    return survives;
   });
   return transmittance;
 }

@@ -8,49 +8,33 @@
 
 namespace virga {
 
-/// Scalars on a regular box of voxels. Index coordinates put voxel (i, j, k)'s *centre* at (i, j, k).
-struct DenseGridView {
-  const float* values = nullptr;  ///< x fastest
+VIRGA_HD constexpr Rgb lerp(Rgb a, Rgb b, float t) { return a + (b - a) * t; }
+
+/// Values on a regular box of voxels. Index coordinates put voxel (i, j, k)'s *centre* at (i, j, k).
+template <class T>
+struct BoxView {
+  const T* values = nullptr;  ///< x fastest
   int nx = 0, ny = 0, nz = 0;
 
   /// Trilinear; coordinates beyond the outermost centres are clamped to them.
-  VIRGA_HD float lookup(Vec3 p) const {
+  VIRGA_HD T lookup(Vec3 p) const {
     const float x = clamp(p.x, 0.f, static_cast<float>(nx - 1));
     const float y = clamp(p.y, 0.f, static_cast<float>(ny - 1));
     const float z = clamp(p.z, 0.f, static_cast<float>(nz - 1));
     const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
     const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
     const int dx = i + 1 < nx ? 1 : 0, dy = j + 1 < ny ? nx : 0, dz = k + 1 < nz ? nx * ny : 0;
-    const float* v =
-        values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
-        static_cast<size_t>(i);
-    const float c00 = lerp(v[0], v[dx], fx), c10 = lerp(v[dy], v[dy + dx], fx);
-    const float c01 = lerp(v[dz], v[dz + dx], fx), c11 = lerp(v[dz + dy], v[dz + dy + dx], fx);
+    const T* v = values +
+                 (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
+                 static_cast<size_t>(i);
+    const T c00 = lerp(v[0], v[dx], fx), c10 = lerp(v[dy], v[dy + dx], fx);
+    const T c01 = lerp(v[dz], v[dz + dx], fx), c11 = lerp(v[dz + dy], v[dz + dy + dx], fx);
     return lerp(lerp(c00, c10, fy), lerp(c01, c11, fy), fz);
   }
 };
 
-/// RGB on a regular box of voxels; as DenseGridView.
-struct RgbGridView {
-  const Rgb* values = nullptr;
-  int nx = 0, ny = 0, nz = 0;
-
-  VIRGA_HD Rgb lookup(Vec3 p) const {
-    const float x = clamp(p.x, 0.f, static_cast<float>(nx - 1));
-    const float y = clamp(p.y, 0.f, static_cast<float>(ny - 1));
-    const float z = clamp(p.z, 0.f, static_cast<float>(nz - 1));
-    const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
-    const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
-    const int dx = i + 1 < nx ? 1 : 0, dy = j + 1 < ny ? nx : 0, dz = k + 1 < nz ? nx * ny : 0;
-    const Rgb* v =
-        values + (static_cast<size_t>(k) * static_cast<size_t>(ny) + static_cast<size_t>(j)) * static_cast<size_t>(nx) +
-        static_cast<size_t>(i);
-    const auto mix = [](Rgb a, Rgb b, float t) { return a + (b - a) * t; };
-    const Rgb c00 = mix(v[0], v[dx], fx), c10 = mix(v[dy], v[dy + dx], fx);
-    const Rgb c01 = mix(v[dz], v[dz + dx], fx), c11 = mix(v[dz + dy], v[dz + dy + dx], fx);
-    return mix(mix(c00, c10, fy), mix(c01, c11, fy), fz);
-  }
-};
+using DenseGridView = BoxView<float>;
+using RgbGridView = BoxView<Rgb>;
 
 /// Scalars on a NanoVDB tree. The grid's own index coordinates: integer points are voxel centres.
 struct SparseGridView {

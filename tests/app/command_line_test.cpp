@@ -8,6 +8,10 @@
 
 #include "app/program.h"
 #include "image/image_io.h"
+#include "loaders/mitsuba_xml.h"
+#include "scene/builder.h"
+#include "scene/scene_parts.h"
+#include "volume/volume_io.h"
 
 namespace virga::app {
 namespace {
@@ -169,8 +173,9 @@ TEST_F(CommandLine, RendersWithTheScenesOwnSettings) {
   EXPECT_EQ(std::get<std::string>(image.metadata.at("virga.method")), "path");
   EXPECT_EQ(std::get<std::string>(image.metadata.at("virga.bias")), "unbiased");
   EXPECT_EQ(std::get<std::string>(image.metadata.at("virga.scene")), "fog.xml");
-  for (const char* name : {"virga.version", "virga.scene_hash", "virga.seed", "virga.seconds", "virga.path.max_depth"})
+  for (const char* name : {"virga.version", "virga.scene_hash", "virga.seed", "virga.seconds", "virga.path.rr_depth"})
     EXPECT_TRUE(image.metadata.contains(name)) << name;
+  EXPECT_EQ(std::get<std::string>(image.metadata.at("virga.path.max_depth")), "20") << "the scene's";
   float brightest = 0;
   for (const Rgb& p : image.beauty.pixels) brightest = std::max(brightest, p.r);
   EXPECT_GT(brightest, 0);
@@ -222,6 +227,7 @@ TEST_F(CommandLine, StatsAreJsonThatSaysWhatWasDone) {
   EXPECT_EQ(stats["scene"]["height"], 10);
   EXPECT_EQ(stats["method"]["name"], "path");
   EXPECT_EQ(stats["method"]["settings"]["max_depth"], "4");
+  EXPECT_EQ(stats["method"]["settings"]["rr_depth"], "5") << "the scene is silent: the default that is in force";
   EXPECT_EQ(stats["method"]["seed"], 7);
   EXPECT_EQ(stats["non_finite_samples"], 0);
   EXPECT_GT(stats["estimated_relmse"].get<double>(), 0);
@@ -359,12 +365,40 @@ TEST_F(CommandLine, MakesSequences) {
   EXPECT_FALSE(identical(picture("1.exr"), picture("3.exr")));
 }
 
+TEST_F(CommandLine, FramesOfASequenceFitItsScene) {
+  ASSERT_EQ(run({"make", "cloud", "-o", "c.vdb", "--frames", "24", "--resolution", "24", "--scene", "c.xml"}).exitCode,
+            0);
+  // Each frame's active voxels lie in the scene's one box: its half edges are those of the union of all frames.
+  Bounds all;
+  for (const std::string frame : {"0001", "0012", "0024"})
+    all.extend(listGrids(scratch_.path("c." + frame + ".vdb")).at(0).worldBounds);
+  const SceneSnapshot scene = buildScene(loadMitsubaXml(scratch_.path("c.xml")));
+  const auto& boundary = scene->parts->boundaryShapes.at(0)->bounds;
+  const float slack = 1e-5f;
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_LE(boundary.lo[axis], all.lo[axis] + slack);
+    EXPECT_GE(boundary.hi[axis], all.hi[axis] - slack);
+  }
+}
+
 TEST_F(CommandLine, MakesTheSameVolumeAgain) {
-  ASSERT_EQ(run({"make", "cloud", "-o", "a.vol", "--resolution", "20", "--seed", "3"}).exitCode, 0);
-  ASSERT_EQ(run({"make", "cloud", "-o", "b.vol", "--resolution", "20", "--seed", "3"}).exitCode, 0);
-  ASSERT_EQ(run({"make", "cloud", "-o", "c.vol", "--resolution", "20", "--seed", "4"}).exitCode, 0);
-  EXPECT_EQ(scratch_.read("a.vol"), scratch_.read("b.vol"));
-  EXPECT_NE(scratch_.read("a.vol"), scratch_.read("c.vol"));
+  for (const std::string end : {".vol", ".vdb", ".nvdb"}) {
+    ASSERT_EQ(run({"make", "cloud", "-o", "a" + end, "--resolution", "20", "--seed", "3"}).exitCode, 0);
+    ASSERT_EQ(run({"make", "cloud", "-o", "b" + end, "--resolution", "20", "--seed", "3"}).exitCode, 0);
+    ASSERT_EQ(run({"make", "cloud", "-o", "c" + end, "--resolution", "20", "--seed", "4"}).exitCode, 0);
+    EXPECT_EQ(scratch_.read("a" + end), scratch_.read("b" + end)) << end;
+    EXPECT_NE(scratch_.read("a" + end), scratch_.read("c" + end)) << end;
+  }
+}
+
+TEST_F(CommandLine, MakeOverwritesNoVolumeThatItWasNotTold) {
+  scratch_.write("x.vol", "somebody's");
+  const Ended refused = run({"make", "fog", "-o", "x.xml", "--resolution", "8"});
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_TRUE(contains(refused.err, "x.vol")) << refused.err;
+  EXPECT_EQ(scratch_.read("x.vol"), "somebody's");
+  ASSERT_EQ(run({"make", "fog", "-o", "x.vol", "--scene", "x.xml", "--resolution", "8"}).exitCode, 0);
+  EXPECT_EQ(run({"make", "fog", "-o", "x.xml", "--resolution", "8"}).exitCode, 0) << "once made, it may be made again";
 }
 
 }  // namespace

@@ -33,6 +33,7 @@ class Relaxation final : public Method {
     const double residual = static_cast<double>((kTarget - value_) / kTarget);
     return {.kind = PassResult::Kind::replaced, .biased = true, .converged = residual < 1e-3, .residual = residual};
   }
+  SettingValues settingsInForce() const override { return {}; }
   Overlay overlay() const override { return {{{Vec3(1, 2, 3), Rgb(0, 1, 0)}}}; }
   std::string saveState() const override { return std::string(reinterpret_cast<const char*>(&value_), sizeof value_); }
   void loadState(std::string_view state) override { std::memcpy(&value_, state.data(), sizeof value_); }

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files that other programs wrote. They are not part of the repository: VIRGA_ASSETS names the folder that has
-// volumes/.
+// Files that other programs wrote. They are not part of the repository: the tests are registered where VIRGA_ASSETS (a
+// CMake option, or an environment variable when CMake runs) names the folder that has volumes/.
 #include <gtest/gtest.h>
 
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -19,15 +17,6 @@ namespace fs = std::filesystem;
 
 class Assets : public testing::Test {
  protected:
-  void SetUp() override {
-    const char* folder = std::getenv("VIRGA_ASSETS");
-    if (folder == nullptr) {
-      std::fprintf(stderr, "\n*** VIRGA_ASSETS is not set: NOT TESTED against files of other programs ***\n\n");
-      GTEST_SKIP() << "VIRGA_ASSETS is not set";
-    }
-    volumes_ = fs::path(folder) / "volumes";
-  }
-
   std::string complaint(const std::string& name) const {
     try {
       loadVolume(volumes_ / name);
@@ -37,7 +26,7 @@ class Assets : public testing::Test {
     return "no error";
   }
 
-  fs::path volumes_;
+  fs::path volumes_ = fs::path(VIRGA_ASSETS) / "volumes";
 };
 
 TEST_F(Assets, OldFileVersionOfHalves) {

@@ -24,6 +24,13 @@ class PathMethod final : public Method {
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
+  SettingValues settingsInForce() const override {
+    const PathOptions options = optionsForScene();
+    return {{"max_depth", std::to_string(options.maxDepth)},
+            {"rr_depth", std::to_string(options.rrDepth)},
+            {"equiangular_depth", std::to_string(options.equiangularDepth)}};
+  }
+
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const EmbreeRays rays{*scene_->surfaceRays, *scene_->boundaryRays};
     const PathOptions options = optionsForScene();

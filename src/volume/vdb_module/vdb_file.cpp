@@ -18,6 +18,7 @@
 #include <sstream>
 #include <streambuf>
 
+#include "core/byte_hash.h"
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
 #include "volume/vdb_module/vdb_walk.h"
@@ -356,10 +357,25 @@ bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* 
   return false;
 }
 
+// OpenVDB gives every file a random identifier, as text behind magic number, file version, library version and the flag
+// of grid offsets. Ours is a function of what follows it: equal volumes make equal files.
+void fixIdentifier(std::string& file) {
+  constexpr size_t kStart = 8 + 4 + 2 * 4 + 1, kLength = 36;
+  VIRGA_ASSERT(file.size() > kStart + kLength);
+  ByteHash hash;
+  hash.add(std::string_view(file).substr(kStart + kLength));
+  const uint64_t a = hash.value(), b = hash64(a);
+  file.replace(kStart, kLength,
+               fmt::format("{:08x}-{:04x}-4{:03x}-a{:03x}-{:012x}", a >> 32, a & 0xffff, (a >> 16) & 0xfff, b >> 52,
+                           b & 0xffffffffffff));
+}
+
 std::string encodeVdb(const DenseVolume& volume) {
   std::ostringstream out;
   VdbWriter().write(out, gridOf(volume));
-  return std::move(out).str();
+  std::string file = std::move(out).str();
+  fixIdentifier(file);
+  return file;
 }
 
 std::string encodeNvdb(const DenseVolume& volume) {
