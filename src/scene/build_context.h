@@ -69,6 +69,18 @@ void buildSensor(BuildContext&, const Node& sensor);
 void buildIntegrator(BuildContext&, const Node& integrator);
 int buildBsdf(BuildContext&, const Node& bsdf);      ///< index into parts.bsdfs
 int buildMedium(BuildContext&, const Node& medium);  ///< index into parts.media
+void readPhase(BuildContext&, PluginReader& medium, MediumView&);
+
+/// A volume of numbers, and where it stands. The scene's parts own its grid.
+struct ScalarField {
+  GridView grid;
+  Affine worldToGrid;
+  float maximum = 0;
+};
+ScalarField buildScalarVolume(BuildContext&, const Node& volume);
+/// Of the same storage.
+bool sameGrid(const GridView&, const GridView&);
+
 void buildShape(BuildContext&, const Node& shape);
 void buildEmitter(BuildContext&, const Node& emitter);
 void addAreaEmitter(BuildContext&, const Node& emitter, int surface, const BuiltShape&);

@@ -7,24 +7,6 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kPhasesNotYet[] = {"rayleigh", "schlick", "tabphase", "blendphase"};
-
-PhaseFunction buildPhase(BuildContext& context, const NodePtr& node) {
-  if (!node) return PhaseFunction(Isotropic{});
-  using Build = PhaseFunction (*)(PluginReader&);
-  static constexpr auto meanCosine = [](PluginReader& r) {
-    return r.number("g", 0.8f, {.lo = -1, .hi = 1, .openLo = true, .openHi = true});
-  };
-  static constexpr PluginRow<Build> kPhases[] = {
-      {"isotropic", [](PluginReader&) { return PhaseFunction(Isotropic{}); }},
-      {"hg", [](PluginReader& r) { return PhaseFunction(HenyeyGreenstein{meanCosine(r)}); }},
-      {"cornette_shanks", [](PluginReader& r) { return PhaseFunction(CornetteShanks{meanCosine(r)}); }}};
-  PluginReader reader(*node, context.diagnostics);
-  const PhaseFunction phase = findPlugin(*node, kPhases, kPhasesNotYet)(reader);
-  reader.finish();
-  return phase;
-}
-
 /// A volume plugin's grid and where it stands; exactly one of the pointers, or a constant.
 struct VolumeField {
   Rgb constant;
@@ -198,7 +180,7 @@ MediumView readMedium(BuildContext& context, PluginReader& reader) {
   medium.sigmaT *= reader.number("scale", 1, reader.nonNegative());
   if (!std::isfinite(medium.sigmaT)) reader.fail("scale", "\"scale\" times \"sigma_t\" is too large");
   if (!medium.homogeneous) requireTrackable(reader, medium);
-  medium.phase = buildPhase(context, reader.child("phase"));
+  readPhase(context, reader, medium);
   reader.ignore("sample_emitters");
   reader.ignore("has_spectral_extinction");
   reader.ignore("majorant_resolution_factor");
@@ -212,15 +194,10 @@ MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
   return medium;
 }
 
-bool sameGrid(const GridView& a, const GridView& b) {
-  return a.kind == b.kind && a.dense.values == b.dense.values && a.sparse.grid == b.sparse.grid &&
-         a.background == b.background;
-}
-
 bool sameMedium(const MediumView& a, const MediumView& b) {
   return a.sigmaT == b.sigmaT && a.homogeneous == b.homogeneous && sameGrid(a.density, b.density) &&
          a.worldToDensity == b.worldToDensity && a.albedo == b.albedo && a.albedoGrid.values == b.albedoGrid.values &&
-         a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase;
+         a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase && a.phaseBlends == b.phaseBlends;
 }
 
 // Media of equal content are one, as if they had been referred to: a boundary whose exterior repeats what surrounds it
@@ -233,6 +210,22 @@ int indexOf(std::vector<MediumView>& media, const MediumView& medium) {
 }
 
 }  // namespace
+
+bool sameGrid(const GridView& a, const GridView& b) {
+  return a.kind == b.kind && a.dense.values == b.dense.values && a.sparse.grid == b.sparse.grid &&
+         a.background == b.background;
+}
+
+ScalarField buildScalarVolume(BuildContext& context, const Node& volume) {
+  const VolumeField field = buildVolume(context, volume, VolumeUse::density);
+  if (field.grid) return {field.grid->view(), Affine(field.indexToWorld.inverse()), field.grid->maximum()};
+  if (!isGrey(field.constant))
+    throw Error("a volume of numbers is needed here, and this one has a colour",
+                {volume.position, "give one value", {}});
+  ScalarField constant;
+  constant.grid.background = constant.maximum = field.constant.r;
+  return constant;
+}
 
 int buildMedium(BuildContext& context, const Node& node) {
   if (const auto known = context.mediumIndex.find(&node); known != context.mediumIndex.end()) return known->second;

@@ -3,7 +3,7 @@
 
 #include "core/rgb.h"
 #include "core/transform.h"
-#include "scattering/phase.h"
+#include "scene/phase_weights.h"
 #include "volume/grid_view.h"
 
 namespace virga {
@@ -20,11 +20,15 @@ struct MediumView {
   Affine worldToAlbedo;
 
   PhaseFunction phase;
+  PhaseBlends phaseBlends;  ///< of a mixture whose weights are not the same everywhere
 
   VIRGA_HD float sigmaTAt(Vec3 p) const {
     return homogeneous ? sigmaT : sigmaT * density.lookup(worldToDensity.point(p));
   }
   VIRGA_HD Rgb albedoAt(Vec3 p) const { return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo; }
+  VIRGA_HD PhaseFunction phaseAt(Vec3 p) const {
+    return phaseBlends.size == 0 ? phase : PhaseFunction(phaseBlends.at(p, *phase.get<PhaseMixture>()));
+  }
 };
 
 /// What a boundary says about the media on its two sides; indices into the scene's media, kNone is vacuum.

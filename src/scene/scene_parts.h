@@ -33,6 +33,12 @@ struct BuiltEnvironment {
   float meanRadiance = 0;  ///< over the sphere, mean of the channels, before the emitter's scale
 };
 
+/// What a mixture of phase functions refers to: a tree of blends as the list of its leaves.
+struct BuiltMixture {
+  std::vector<PlainPhase> lobes;
+  std::vector<PhaseBlend> blends;
+};
+
 /// Expensive objects by everything that went into them, so that the next snapshot finds them again.
 struct PartCache {
   std::map<std::string, std::shared_ptr<const BuiltShape>> shapes;
@@ -48,6 +54,8 @@ struct Scene::Parts {
   std::vector<MediumTransition> boundaries;
   std::vector<SurfaceBsdf> bsdfs;
   std::vector<MediumView> media;
+  std::vector<std::shared_ptr<const PhaseTable>> phaseTables;
+  std::vector<std::shared_ptr<const BuiltMixture>> phaseMixtures;
   std::vector<EmitterView> emitters;
   Discrete emitterChoice;
 };

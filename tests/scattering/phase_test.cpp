@@ -1,24 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scattering/phase.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/random.h"
-#include "stats/stats.h"
+#include "scattering/phase_checks.h"
 
 namespace virga {
 namespace {
 
-constexpr double kInv4PiDouble = 0.079577471545947667;
+using namespace phases;
+
 constexpr float kAsymmetries[] = {-0.99f, -0.85f, -0.3f, -1e-3f, 0.f, 1e-6f, 1e-3f, 0.5f, 0.85f, 0.95f, 0.99f};
-
-const Vec3 kWo = normalize(Vec3(0.3f, -0.5f, 0.8f));
-
-double scatteringCosine(Vec3 wo, Vec3 wi) {
-  return -(static_cast<double>(wo.x) * wi.x + static_cast<double>(wo.y) * wi.y + static_cast<double>(wo.z) * wi.z);
-}
 
 // Henyey-Greenstein in double precision; 1 - cos(angle to the peak) as half a squared distance.
 double henyeyGreenstein(double g, Vec3 wo, Vec3 wi) {
@@ -31,38 +23,8 @@ double henyeyGreenstein(double g, Vec3 wo, Vec3 wi) {
 // Another g, wrong by a few percent of the width of the peak.
 float slightlyWrong(float g) { return g + std::copysign(0.06f * (1 - std::fabs(g)), g); }
 
-template <class Phase>
-double samplingP(Phase drawn, Phase claimed, Vec3 wo) {
-  return stats::chiSquared(
-      {.axis = -wo}, [&](Vec2 u) { return drawn.sample(wo, u).wi; }, [&](Vec3 wi) { return claimed.pdf(wo, wi); });
-}
-
-template <class Phase>
-double integral(Phase phase, Vec3 wo) {
-  return stats::integrateSphere([&](Vec3 wi) { return phase.value(wo, wi); }, -wo);
-}
-
-template <class Phase>
-double meanCosine(Phase phase, Vec3 wo) {
-  return stats::integrateSphere([&](Vec3 wi) { return phase.value(wo, wi) * scatteringCosine(wo, wi); }, -wo);
-}
-
 // What single precision leaves of a value: a direction is known to 1e-7, and the peak is 1 - |g| wide.
 double peakTolerance(float g) { return 2e-6 + 1e-6 / static_cast<double>(1 - std::fabs(g)); }
-
-template <class Phase>
-void expectConsistentSamples(Phase phase, float g) {
-  Pcg32 rng(7);
-  for (int i = 0; i < 2000; ++i) {
-    const Vec3 wo = uniformSphere({rng.next(), rng.next()});
-    const PhaseSample s = phase.sample(wo, {rng.next(), rng.next()});
-    const float tolerance = static_cast<float>(peakTolerance(g));
-    ASSERT_NEAR(length(s.wi), 1, 1e-6) << g;
-    ASSERT_NEAR(s.pdf, phase.pdf(wo, s.wi), tolerance * s.pdf) << g;
-    ASSERT_NEAR(s.value, phase.value(wo, s.wi), tolerance * s.value) << g;
-    ASSERT_EQ(phase.value(wo, s.wi), phase.value(s.wi, wo)) << "reciprocity, g = " << g;
-  }
-}
 
 TEST(Isotropic, SamplesFollowTheDensity) {
   EXPECT_GT(samplingP(Isotropic{}, Isotropic{}, kWo), 1e-4);
@@ -72,7 +34,7 @@ TEST(Isotropic, SamplesFollowTheDensity) {
   EXPECT_LT(wrong, 1e-4) << "the test cannot fail";
   EXPECT_NEAR(integral(Isotropic{}, kWo), 1, 1e-6);
   EXPECT_NEAR(meanCosine(Isotropic{}, kWo), 0, 1e-6);
-  expectConsistentSamples(Isotropic{}, 0);
+  expectConsistentSamples(Isotropic{}, 1e-6);
 }
 
 TEST(HenyeyGreenstein, SamplesFollowTheDensity) {
@@ -142,7 +104,7 @@ TEST(HenyeyGreenstein, SampledMeanCosineIsG) {
 }
 
 TEST(HenyeyGreenstein, SampleAgreesWithValue) {
-  for (float g : kAsymmetries) expectConsistentSamples(HenyeyGreenstein{g}, g);
+  for (float g : kAsymmetries) expectConsistentSamples(HenyeyGreenstein{g}, peakTolerance(g), std::to_string(g));
 }
 
 TEST(HenyeyGreenstein, ForwardAndBackwardAreMirrorImages) {
@@ -155,11 +117,7 @@ TEST(HenyeyGreenstein, ForwardAndBackwardAreMirrorImages) {
 
 TEST(HenyeyGreenstein, RandomNumbersAtTheEndsOfTheirRangeStayFinite) {
   for (float g : {-0.999f, -0.99f, -1e-30f, 0.f, 1e-30f, 0.99f, 0.999f})
-    for (float x : {0.f, 0x1p-24f, 0.5f, 0x1.fffffep-1f}) {
-      const PhaseSample s = HenyeyGreenstein{g}.sample(kWo, {x, x});
-      EXPECT_TRUE(isFinite(s.wi) && std::isfinite(s.pdf) && s.pdf > 0) << g << " " << x;
-      EXPECT_NEAR(length(s.wi), 1, 1e-6);
-    }
+    expectSoundEnds(HenyeyGreenstein{g}, std::to_string(g));
 }
 
 TEST(CornetteShanks, SamplesFollowTheDensity) {
@@ -202,7 +160,69 @@ TEST(CornetteShanks, WithoutAsymmetryIsRayleighs) {
 }
 
 TEST(CornetteShanks, SampleAgreesWithValue) {
-  for (float g : kAsymmetries) expectConsistentSamples(CornetteShanks{g}, g);
+  for (float g : kAsymmetries) expectConsistentSamples(CornetteShanks{g}, peakTolerance(g), std::to_string(g));
+}
+
+TEST(Rayleigh, SamplesFollowTheDensity) {
+  EXPECT_GT(samplingP(Rayleigh{}, Rayleigh{}, kWo), 1e-4);
+  const double wrong = stats::chiSquared(
+      {.axis = -kWo}, [](Vec2 u) { return Rayleigh{}.sample(kWo, u).wi; },
+      [](Vec3 wi) { return 0.9 * Rayleigh{}.pdf(kWo, wi) + 0.1 * kInv4PiDouble; });
+  EXPECT_LT(wrong, 1e-4) << "the test cannot fail";
+  expectConsistentSamples(Rayleigh{}, 2e-6);
+  expectSoundEnds(Rayleigh{});
+}
+
+TEST(Rayleigh, IntegratesToOneWithMeanCosineZero) {
+  EXPECT_NEAR(integral(Rayleigh{}, kWo), 1, 1e-6);
+  EXPECT_NEAR(meanCosine(Rayleigh{}, kWo), 0, 1e-6);
+}
+
+// The values of Mitsuba 3.9 agree in all digits of single precision.
+TEST(Rayleigh, ValueIsTheFormula) {
+  expectValues(Rayleigh{}, std::initializer_list<double>{0.119366207, 0.0932548495, 0.065054583, 0.0596831037,
+                                                         0.0634132976, 0.081169021, 0.108026418, 0.119366207});
+}
+
+// The share of cosines below c is (c^3 + 3 c + 4) / 8.
+TEST(Rayleigh, TheCubicIsSolved) {
+  for (int i = 0; i <= 1000; ++i) {
+    const float u = std::min(static_cast<float>(i) / 1000, 0x1.fffffep-1f);
+    const double c = scatteringCosine({0, 0, 1}, Rayleigh{}.sample({0, 0, 1}, {u, 0}).wi);
+    ASSERT_NEAR((c * c * c + 3 * c + 4) / 8, static_cast<double>(u), 3e-7) << u;
+  }
+}
+
+TEST(Schlick, SamplesFollowTheDensity) {
+  for (float k : kAsymmetries) {
+    EXPECT_GT(samplingP<Schlick>({k}, {k}, kWo), 1e-4) << k;
+    EXPECT_LT(samplingP<Schlick>({k}, {slightlyWrong(k)}, kWo), 1e-4) << "the test cannot fail at k = " << k;
+    expectConsistentSamples(Schlick{k}, peakTolerance(k), std::to_string(k));
+  }
+  for (float k : {-0.999f, -1e-30f, 1e-30f, 0.999f}) expectSoundEnds(Schlick{k}, std::to_string(k));
+}
+
+TEST(Schlick, IntegratesToOneWithItsMeanCosine) {
+  for (float k : kAsymmetries) {
+    EXPECT_NEAR(integral(Schlick{k}, kWo), 1, 1e-4) << k;
+    const double a = static_cast<double>(k);
+    // 1 / k - (1 - k^2) atanh(k) / k^2, whose terms cancel for small k: there its series.
+    const double expected =
+        std::fabs(a) < 0.01 ? a * (2.0 / 3 + a * a * 2 / 15) : 1 / a - (1 - a * a) * std::atanh(a) / (a * a);
+    EXPECT_NEAR(meanCosine(Schlick{k}, kWo), expected, 1e-4) << k;
+  }
+}
+
+TEST(Schlick, ValueIsTheFormula) {
+  expectValues(Schlick{0.6f}, std::initializer_list<double>{0.0198943679, 0.0242233445, 0.0365768327, 0.0509295818,
+                                                            0.0704907706, 0.124339799, 0.240688005, 0.318309886});
+}
+
+TEST(Schlick, ComesNearToHenyeyAndGreenstein) {
+  for (float g : {-0.7f, -0.3f, 0.f, 0.3f, 0.7f}) {
+    const Schlick phase{Schlick::likeHenyeyGreenstein(g)};
+    EXPECT_NEAR(meanCosine(phase, kWo), static_cast<double>(g), 0.07) << g;
+  }
 }
 
 TEST(PhaseFunction, ForwardsToWhatItHolds) {
@@ -218,6 +238,10 @@ TEST(PhaseFunction, ForwardsToWhatItHolds) {
   expectSame(PhaseFunction(Isotropic{}), Isotropic{});
   expectSame(PhaseFunction(HenyeyGreenstein{0.6f}), HenyeyGreenstein{0.6f});
   expectSame(PhaseFunction(CornetteShanks{-0.4f}), CornetteShanks{-0.4f});
+  expectSame(PhaseFunction(Rayleigh{}), Rayleigh{});
+  expectSame(PhaseFunction(Schlick{0.7f}), Schlick{0.7f});
+  EXPECT_EQ(PhaseFunction(HenyeyGreenstein{0.6f}), PhaseFunction(HenyeyGreenstein{0.6f}));
+  EXPECT_NE(PhaseFunction(HenyeyGreenstein{0.6f}), PhaseFunction(HenyeyGreenstein{0.5f}));
   EXPECT_NE(PhaseFunction(HenyeyGreenstein{0.6f}), PhaseFunction(CornetteShanks{0.6f}));
 }
 

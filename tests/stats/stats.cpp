@@ -21,8 +21,7 @@ constexpr double kIntegralSlack = 2e-3;  // of a density that claims to integrat
 constexpr double kCellTolerance = 1e-6;  // absolute error of the integral over one cell
 constexpr double kNarrowest = 1e-7;      // of a ring or interval, relative to the whole
 
-// --- Quadrature
-// ----------------------------------------------------------------------------------------------------------
+// --- Quadrature ---
 
 // Gauss-Legendre, three points on [0, 1].
 constexpr std::array<double, 3> kNode = {0.11270166537925831, 0.5, 0.88729833462074169};
@@ -67,8 +66,7 @@ double adaptive(const F& f, const Rectangle& r, double whole, double tolerance, 
   return refined;
 }
 
-// --- The sphere about an axis, in double precision
-// -------------------------------------------------------------------------
+// --- The sphere about an axis, in double precision ---
 
 struct Axis {
   std::array<double, 3> s, t, n;
@@ -101,8 +99,7 @@ struct Axis {
   static double along(const std::array<double, 3>& a, Vec3 v) { return a[0] * v.x + a[1] * v.y + a[2] * v.z; }
 };
 
-// --- Cells
-// -----------------------------------------------------------------------------------------------------------------
+// --- Cells ---
 
 // A strip of the domain (a ring, an interval) with the share of the density in each of its cells.
 struct Strip {
@@ -216,8 +213,7 @@ std::vector<Strip> rings(const SphereTest& test, const Density& density) {
   return joinStrips(out, test.theta);
 }
 
-// --- Incomplete gamma and beta
-// ---------------------------------------------------------------------------------------------
+// --- Incomplete gamma and beta ---
 
 constexpr double kEpsilon = 1e-15;
 constexpr double kTiny = 1e-300;

@@ -14,8 +14,7 @@
 /// before. Each such test wants a negative control: a claim that is slightly wrong and must get a small p-value.
 namespace virga::stats {
 
-// --- Goodness of fit
-// -----------------------------------------------------------------------------------------------------
+// --- Goodness of fit ---
 
 /// Cells of the unit sphere: rings about `axis`, each cut into `phi` equal sectors. The rings are chosen so that each
 /// holds about the same share of the density, however peaked it is about the axis; the equator is a border of rings
@@ -68,8 +67,7 @@ double chiSquaredCounts(std::span<const double> observed, std::span<const double
 /// function `cdf` (asymptotic; some 50 values at least).
 double kolmogorovSmirnov(std::vector<double> values, const std::function<double(double)>& cdf);
 
-// --- Integrals
-// -----------------------------------------------------------------------------------------------------------
+// --- Integrals ---
 
 /// Integral over the unit sphere [unit of f times sr], adaptive; a peak should lie on `axis` unless it is wider than
 /// 0.02 rad. The error is about `tolerance`, and no better than what f can tell of single-precision directions.
@@ -78,8 +76,7 @@ double integrateSphere(const std::function<double(Vec3)>& f, Vec3 axis = {0, 0, 
 /// Integral over [lo, hi], adaptive, error about `tolerance`.
 double integrateInterval(const std::function<double(double)>& f, double lo, double hi, double tolerance = 1e-8);
 
-// --- Means
-// ---------------------------------------------------------------------------------------------------------------
+// --- Means ---
 
 /// Running count, mean and variance (Welford 1962).
 class Moments {
@@ -116,8 +113,7 @@ struct LineFit {
 /// Least squares y = intercept + slope x; at least two different x. For a rate of convergence fit logarithms.
 LineFit fitLine(std::span<const double> x, std::span<const double> y);
 
-// --- Distribution functions
-// ----------------------------------------------------------------------------------------------
+// --- Distribution functions ---
 
 double gammaUpper(double a, double x);  ///< regularised upper incomplete gamma function Q(a, x); a > 0, x >= 0
 double betaRegularised(double a, double b, double x);  ///< regularised incomplete beta function I_x(a, b); a, b > 0

@@ -214,7 +214,7 @@ class PathTracer {
     if (!(light.pdf > 0) || isBlack(light.radiance)) return;
 
     const MediumView& medium = scene_.media[segment.medium];
-    const float phase = medium.phase.value(wo, light.wi);
+    const PhaseFunction phase = medium.phaseAt(x);
     const float flight = segment.freeFlightPdf(distance.t);
     const float own = choice.probability * distance.pdf * light.pdf;
     float w = 1;
@@ -222,23 +222,23 @@ class PathTracer {
       w = weight(own, flight * choice.probability);
     } else {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
-      w = weight(own, flight * choice.probability * connection, flight * medium.phase.pdf(wo, light.wi));
+      w = weight(own, flight * choice.probability * connection, flight * phase.pdf(wo, light.wi));
     }
     const float seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
     layers.scatter(LayerPath::Vertex::medium);
     // sigma_s tau = albedo * flight
-    path.add(layers, medium.albedoAt(x) * light.radiance * (flight * phase * seen * w / own));
+    path.add(layers, medium.albedoAt(x) * light.radiance * (flight * phase.value(wo, light.wi) * seen * w / own));
   }
 
   /// Technique A at a medium vertex.
-  VIRGA_HD void connectMedium(Path& path, const MediumView& medium, const MediaState& media, Vec3 x, Vec3 wo,
+  VIRGA_HD void connectMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
                               Sampler& sampler) const {
     if (!hasLights()) return;
     const Connection c = sampleConnection(path, x, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const float own = c.choice * c.light.pdf;
-    const float phasePdf = c.light.delta ? 0 : medium.phase.pdf(wo, c.light.wi);
+    const float phasePdf = c.light.delta ? 0 : phase.pdf(wo, c.light.wi);
     float w = weight(own, phasePdf);
     const EquiangularSegment& segment = path.last.segment;
     const EmitterView& emitter = scene_.emitters[c.emitter];
@@ -248,7 +248,7 @@ class PathTracer {
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
     const float seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
-    if (seen > 0) path.add(path.layers, c.light.radiance * (medium.phase.value(wo, c.light.wi) * seen * w / own));
+    if (seen > 0) path.add(path.layers, c.light.radiance * (phase.value(wo, c.light.wi) * seen * w / own));
   }
 
   /// Technique A' at a surface vertex.
@@ -278,9 +278,10 @@ class PathTracer {
     path.layers.scatter(LayerPath::Vertex::medium);
     path.last = {x, 0, true, collision.t, {}};
     if (segment.contains(collision.t) && collision.medium == segment.medium) path.last.segment = segment;
-    connectMedium(path, medium, media, x, wo, sampler);
+    const PhaseFunction phase = medium.phaseAt(x);
+    connectMedium(path, phase, media, x, wo, sampler);
 
-    const PhaseSample s = medium.phase.sample(wo, pair(path, sampler));
+    const PhaseSample s = phase.sample(wo, pair(path, sampler));
     path.throughput *= s.value / s.pdf;
     path.last.pdf = s.pdf;
     path.at = {{x, s.wi}, media, 0};
