@@ -20,6 +20,12 @@ std::string cloud(const std::string& albedo, const std::string& g = "0.7") {
          albedo + R"("/><phase type="hg"><float name="g" value=")" + g + R"("/></phase></medium></shape>)";
 }
 
+std::string cloudOf(const std::string& phase) {
+  return R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
+    <float name="albedo" value="1"/>)" +
+         phase + "</medium></shape>";
+}
+
 // Mean radiance, to within its standard error.
 stats::Moments furnace(const std::string& elements, int passes = 64) {
   return pixelMoments(rendered(sceneOf(kSensor + elements), {.passes = passes}).film().beauty());
@@ -35,9 +41,18 @@ TEST(Furnace, EmptySceneIsWhite) { expectWhite(""); }
 TEST(Furnace, MediumIsWhite) { expectWhite(cloud("1")); }
 TEST(Furnace, BackwardMediumIsWhite) { expectWhite(cloud("1", "-0.8")); }
 TEST(Furnace, CornetteShanksIsWhite) {
-  expectWhite(
-      R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="2"/>
-    <float name="albedo" value="1"/><phase type="cornette_shanks"><float name="g" value="0.5"/></phase></medium></shape>)");
+  expectWhite(cloudOf(R"(<phase type="cornette_shanks"><float name="g" value="0.5"/></phase>)"));
+}
+TEST(Furnace, RayleighIsWhite) { expectWhite(cloudOf(R"(<phase type="rayleigh"/>)")); }
+TEST(Furnace, SchlickIsWhite) {
+  expectWhite(cloudOf(R"(<phase type="schlick"><float name="g" value="0.6"/></phase>)"));
+}
+TEST(Furnace, TableIsWhite) {
+  expectWhite(cloudOf(R"(<phase type="tabphase"><string name="values" value="0, 1, 0, 0.5, 8"/></phase>)"));
+}
+TEST(Furnace, BlendIsWhite) {
+  expectWhite(cloudOf(R"(<phase type="blendphase"><float name="weight" value="0.3"/><phase type="hg"/>
+    <phase type="cornette_shanks"><float name="g" value="-0.5"/></phase></phase>)"));
 }
 TEST(Furnace, DiffuseObjectsAreWhite) {
   expectWhite(R"(<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>

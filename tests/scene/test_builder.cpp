@@ -64,10 +64,10 @@ TEST(Builder, EveryPluginHasDefaults) {
     ASSERT_EQ(scene->view.media.size, 1) << medium;
     EXPECT_EQ(scene->view.media[0].sigmaT, 1) << medium;
     EXPECT_EQ(scene->view.media[0].albedo, Rgb(0.75f)) << medium;
-    EXPECT_EQ(scene->view.media[0].phase.kind(), PhaseFunction::Kind::isotropic);
+    EXPECT_TRUE(scene->view.media[0].phase.get<Isotropic>());
     EXPECT_EQ(scene->view.boundaries.size, 1);
   }
-  for (const char* phase : {"isotropic", "hg", "cornette_shanks"})
+  for (const char* phase : {"isotropic", "hg", "cornette_shanks", "rayleigh", "schlick"})
     EXPECT_NO_THROW(test::build(
         boundary(fmt::format("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"{}\"/></medium>", phase))));
   const SceneSnapshot scene = test::build("<integrator type=\"volpath\"/><emitter type=\"constant\"/>");
@@ -107,8 +107,6 @@ TEST(Builder, PluginsOfTheFutureAreNotUnknown) {
       "type=\"[[lanczos]]\"/>"
       "</film></sensor>",
       "rfilter type \"lanczos\" is not supported yet");
-  expectError(boundary("<medium name=\"interior\" type=\"homogeneous\"><phase type=\"[[rayleigh]]\"/></medium>"),
-              "phase type \"rayleigh\" is not supported yet");
   expectError(
       "<shape type=\"cube\"><bsdf type=\"diffuse\"><[[texture]] name=\"reflectance\" type=\"bitmap\"/></bsdf></shape>",
       "textures (\"bitmap\") are not supported yet", "give an rgb value");
@@ -299,7 +297,7 @@ TEST(Builder, ObjectsThatAreOnlyReferredToMayStandAnywhere) {
       "name=\"interior\" "
       "type=\"homogeneous\"><ref id=\"forward\"/></medium></shape>");
   EXPECT_EQ(scene->view.emitters.size, 1);
-  EXPECT_EQ(scene->view.media[0].phase.g(), 0.5f);
+  EXPECT_EQ(scene->view.media[0].phase, PhaseFunction(HenyeyGreenstein{0.5f}));
 }
 
 TEST(Builder, ASensorWithoutAngleHasTheLensOf50Millimetres) {
