@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "scene/build_context.h"
+#include "scene/closed_mesh.h"
 
 namespace virga {
 namespace {
@@ -9,8 +10,10 @@ namespace {
 constexpr std::string_view kNotYet[] = {"cylinder",   "gltf",         "shapegroup",  "instance",
                                         "serialized", "bsplinecurve", "linearcurve", "sdfgrid"};
 
-/// What a shape's surface is for: boundaries need no triangles where an analytic form will do.
-enum class Role { surface, boundary };
+/// What a shape's surface is for: to be seen, also to hold a medium, or only that. Boundaries need no triangles where
+/// an analytic form will do.
+enum class Role { surface, vessel, boundary };
+constexpr std::string_view kRoleNames[] = {"surface", "vessel", "boundary"};
 
 void measure(BuiltShape& shape) {
   std::vector<float> areas;
@@ -23,8 +26,14 @@ void measure(BuiltShape& shape) {
 }
 
 // Takes a mesh in world space.
-void finishMesh(BuiltShape& shape) {
+void finishMesh(BuiltShape& shape, Role role) {
   TriangleMesh& mesh = shape.mesh;
+  if (role != Role::surface) shape.openEdges = openEdges(mesh);
+  // What has no area in single precision has no normal either: no ray and no light shall find it.
+  const std::vector<Vec3>& p = mesh.positions;
+  std::erase_if(mesh.triangles,
+                [&](const auto& t) { return !(lengthSquared(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])) > 0); });
+  if (mesh.triangles.empty()) return;
   mesh.positions.reserve(mesh.positions.size() + 2);  // Embree reads 16 bytes at the last vertex
   shape.view.kind = ShapeView::Kind::mesh;
   shape.view.positions = mesh.positions.data();
@@ -58,13 +67,13 @@ void turnOutward(TriangleMesh& mesh) {
     for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
-void buildRectangle(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
+void buildRectangle(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape) {
   const Matrix4 toWorld = reader.transform("to_world");
   shape.mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
   shape.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
-  finishMesh(shape);
+  finishMesh(shape, role);
 }
 
 void buildCube(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape) {
@@ -75,7 +84,7 @@ void buildCube(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape
                           {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
-  finishMesh(shape);
+  finishMesh(shape, role);
   if (role == Role::boundary && shape.view.orientation > 0) shape.rays = RayShape::box(toWorld);
 }
 
@@ -115,6 +124,7 @@ void buildDisk(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   shape.view.radius = radius;
   shape.rays = RayShape::disk(map.translation, shape.view.normal, radius);
   shape.area = kPi * radius * radius;
+  shape.openEdges = 1;
   shape.bounds = {map.translation - Vec3(radius), map.translation + Vec3(radius)};
 }
 
@@ -129,8 +139,9 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShap
   if (reader.boolean("face_normals", false)) shape.mesh.normals.clear();
   reader.ignore("flip_tex_coords");
   toWorldSpace(shape.mesh, reader.transform("to_world"));
+  if (role != Role::surface) makeWindingAgree(shape.mesh);
   if (role == Role::boundary) turnOutward(shape.mesh);
-  finishMesh(shape);
+  finishMesh(shape, role);
 }
 
 using Build = void (*)(BuildContext&, PluginReader&, Role, BuiltShape&);
@@ -141,7 +152,7 @@ constexpr PluginRow<Build> kShapes[] = {
 // Geometry by its parameters: what hangs on the shape (materials, media, lights) may change without building it again.
 std::shared_ptr<const BuiltShape> geometry(BuildContext& context, PluginReader& reader, Role role) {
   const Build build = findPlugin(reader.node(), kShapes, kNotYet);
-  std::string key = parameterKey(reader.node()) + (role == Role::boundary ? "boundary" : "surface");
+  std::string key = parameterKey(reader.node()) + std::string(kRoleNames[static_cast<size_t>(role)]);
   for (const Property& p : reader.node().properties)
     if (p.name == "filename") key += fileKey(context.file(reader, "filename"));
   // The parameters are read (and checked) in any case, so that unused ones are known.
@@ -165,6 +176,18 @@ MediumTransition mediaOf(BuildContext& context, PluginReader& reader) {
   return media;
 }
 
+// A sheet between two media is well; one medium alone needs a closed shape around it.
+void warnIfOpen(PluginReader& reader, const MediumTransition& media, const BuiltShape& shape) {
+  if (shape.openEdges == 0 || media.interior == MediumTransition::kNone || media.exterior != MediumTransition::kNone)
+    return;
+  const Node& node = reader.node();
+  reader.diagnostics().warn(
+      Error(fmt::format("the {}{} holds a medium and is open: {} of its edges have no neighbour that agrees, and the "
+                        "medium leaks out",
+                        node.type, node.hasGeneratedId() ? "" : fmt::format(" \"{}\"", node.id), shape.openEdges),
+            {node.typePosition.known() ? node.typePosition : node.position, "close it", {}}));
+}
+
 // A shape without a bsdf is a grey one; a lamp without one is black (as Mitsuba has it).
 int defaultBsdf(BuildContext& context, bool emits) {
   context.parts.bsdfs.push_back({Bsdf(Diffuse{emits ? Rgb(0.f) : Rgb(0.5f)}), Bsdf(), false});
@@ -185,8 +208,10 @@ void buildShape(BuildContext& context, const Node& node) {
   const NodePtr bsdf = reader.child("bsdf"), emitter = reader.child("emitter");
   const bool null = bsdf && isNullBsdf(*bsdf);
   if (null && emitter) reader.failHere("an area emitter on a shape with a null bsdf is not supported yet");
-  auto shape = geometry(context, reader, null ? Role::boundary : Role::surface);
+  const bool filled = reader.child("medium", "interior") != nullptr;
+  auto shape = geometry(context, reader, null ? Role::boundary : filled ? Role::vessel : Role::surface);
   MediumTransition media = mediaOf(context, reader);
+  warnIfOpen(reader, media, *shape);
   reader.finish();
   if (bsdf) buildBsdf(context, *bsdf);
   if (null) return addBoundary(context, media, std::move(shape));

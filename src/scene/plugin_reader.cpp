@@ -30,6 +30,10 @@ bool inRange(double v, const PluginReader::Range& r) {
 
 void BuildDiagnostics::complain(const Error& error) {
   if (!lenient) throw error;
+  warn(error);
+}
+
+void BuildDiagnostics::warn(const Error& error) {
   std::string text = error.what();
   if (const size_t at = text.find("error: "); at != std::string::npos) text.replace(at, 5, "warning");
   warnings.push_back(std::move(text));

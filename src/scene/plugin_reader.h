@@ -19,6 +19,7 @@ struct BuildDiagnostics {
 
   /// Throws, or warns where the build is lenient.
   void complain(const Error& error);
+  void warn(const Error& error);
 };
 
 /// Reads a plugin's parameters, each with its type and range, and knows in the end which were never asked for: those

@@ -23,6 +23,7 @@ struct BuiltShape {
   Discrete triangleChoice;  ///< by area
   float area = 0;           ///< [unit^2]
   bool box = false;         ///< a cube as a boundary
+  size_t openEdges = 0;     ///< of a shape that a medium fills; more than 0: it does not enclose a space
 };
 
 /// An environment map with its sampling tables.
