@@ -27,7 +27,7 @@ __global__ void tracePaths(SceneView scene, StubRays rays, PathOptions options, 
   Sampler sampler(SampleId{1, 2, pixel, 3});
   const Vec2 offset = filter.sample(sampler.next2D());
   const PathTracer<StubRays> tracer(scene, rays, options);
-  out[pixel] = tracer.trace(camera.ray(offset.x, offset.y), camera.nearClip, sampler).sum();
+  out[pixel] = tracer.trace(camera.ray(offset.x, offset.y), sampler).sum();
 }
 
 __global__ void lookUp(GridView grid, RgbGridView colors, PhaseFunction phase, const Vec3* at, float* out) {

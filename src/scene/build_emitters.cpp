@@ -136,20 +136,23 @@ EmitterView buildEnvironment(BuildContext& context, PluginReader& reader) {
   return e;
 }
 
-// The radius of the scene stands in for the cross-section that light from infinity meets.
-float power(const EmitterView& e, float sceneRadius) {
-  const float section = kPi * sceneRadius * sceneRadius, v = luminance(e.value);
+// The radius of the scene stands in for the cross-section that light from infinity meets. Double precision: the
+// brightest light that single precision holds must not make all others of no account.
+double power(const EmitterView& e, float sceneRadius) {
+  constexpr double pi = static_cast<double>(kPi);
+  const double section = pi * static_cast<double>(sceneRadius) * static_cast<double>(sceneRadius);
+  const double v = 1e3 * static_cast<double>(luminance(e.value * 1e-3f));
   switch (e.kind) {
     case EmitterView::Kind::point:
-      return 4 * kPi * v;
+      return 4 * pi * v;
     case EmitterView::Kind::spot:
-      return kTwoPi * v * (1 - 0.5f * (std::cos(e.cutoffAngle) + std::cos(e.beamWidth)));
+      return 2 * pi * v * (1 - 0.5 * static_cast<double>(std::cos(e.cutoffAngle) + std::cos(e.beamWidth)));
     case EmitterView::Kind::directional:
       return v * section;
     case EmitterView::Kind::area:
-      return kPi * v * e.area;
+      return pi * v * static_cast<double>(e.area);
     default:
-      return 4 * kPi * v * section;
+      return 4 * pi * v * section;
   }
 }
 
@@ -193,9 +196,12 @@ void addAreaEmitter(BuildContext& context, const Node& node, int surface, const 
 
 void chooseEmittersByPower(BuildContext& context) {
   const float radius = 0.5f * length(context.scene.view.bounds.extent());
-  std::vector<float> powers;
+  std::vector<double> powers;
   for (const EmitterView& e : context.parts.emitters) powers.push_back(power(e, std::max(radius, 1e-3f)));
-  context.parts.emitterChoice = Discrete(powers);
+  const double most = powers.empty() ? 0 : *std::max_element(powers.begin(), powers.end());
+  std::vector<float> shares;
+  for (const double p : powers) shares.push_back(most > 0 ? static_cast<float>(p / most) : 0);
+  context.parts.emitterChoice = Discrete(shares);
 }
 
 }  // namespace virga

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "scene/build_context.h"
+#include "scene/deepest_overlap.h"
 
 namespace virga {
 namespace {
@@ -44,36 +45,11 @@ void measureBounds(Scene& scene, const Scene::Parts& parts) {
   scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
 }
 
-// In how many boxes a point may lie; no more than `enough` are counted. The deepest place begins at the lower x of one
-// box, the lower y of another and the lower z of a third.
-int deepestOverlap(const std::vector<Bounds>& boxes, int enough) {
-  const auto holding = [](const std::vector<Bounds>& all, int axis, float x) {
-    std::vector<Bounds> some;
-    std::copy_if(all.begin(), all.end(), std::back_inserter(some),
-                 [&](const Bounds& b) { return b.lo[axis] <= x && x < b.hi[axis]; });
-    return some;
-  };
-  size_t deepest = 0;
-  const auto limit = static_cast<size_t>(enough);
-  for (const Bounds& a : boxes) {
-    const std::vector<Bounds> inX = holding(boxes, 0, a.lo.x);
-    if (inX.size() <= deepest) continue;
-    for (const Bounds& b : inX) {
-      const std::vector<Bounds> inXY = holding(inX, 1, b.lo.y);
-      if (inXY.size() <= deepest) continue;
-      for (const Bounds& c : inXY) deepest = std::max(deepest, holding(inXY, 2, c.lo.z).size());
-      if (deepest >= limit) return enough;
-    }
-  }
-  return static_cast<int>(deepest);
-}
-
 void warnOfOverlaps(BuildContext& context) {
   std::vector<Bounds> boxes;
   for (size_t i = 0; i < context.parts.boundaries.size(); ++i)
     if (!context.parts.boundaries[i].replaces) boxes.push_back(context.parts.boundaryShapes[i]->bounds);
-  constexpr size_t kFew = 64;  // the search is of the fourth power; scenes of more volumes go without this warning
-  if (boxes.size() <= kFew && deepestOverlap(boxes, MediaState::kCapacity + 1) > MediaState::kCapacity)
+  if (deepestOverlap(std::move(boxes), MediaState::kCapacity + 1) > MediaState::kCapacity)
     context.diagnostics.warnings.push_back(
         fmt::format("warning: more than {0} volumes may overlap; where more than {0} do, the others are left out",
                     MediaState::kCapacity));
@@ -93,6 +69,17 @@ void warnOfDarkness(BuildContext& context) {
     context.diagnostics.warnings.push_back(
         "warning: light of point, spot and directional emitters through smooth glass cannot be found by path: "
         "caustic_* layers lack it; give such lamps a small area");
+}
+
+// The eye may stand exactly on a boundary. Whether it is inside is asked a little beside it, and each camera ray
+// crosses from there to its own start.
+void placeCamera(Scene& scene) {
+  SceneView& view = scene.view;
+  const Vec3 eye = scene.camera.toWorld.translation, aside = normalize(Vec3(0.3217f, -0.6182f, 0.7171f));
+  view.cameraMediaPoint = eye + aside * (4 * kHitError * std::max(maxComponent(abs(eye)), 1e-2f * view.scale));
+  const int declared = view.cameraMedia.base();
+  view.cameraMedia = mediaAt(scene, view.cameraMediaPoint);
+  if (declared != MediaState::kNone) view.cameraMedia.setBase(declared);
 }
 
 NodePtr onlyChild(PluginReader& reader, std::string_view tag) {
@@ -168,9 +155,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   chooseEmittersByPower(context);
   linkViews(*scene, *parts);
   warnOfDarkness(context);
-  const int declared = scene->view.cameraMedia.base();
-  scene->view.cameraMedia = mediaAt(*scene, scene->camera.toWorld.translation);
-  if (declared != MediaState::kNone) scene->view.cameraMedia.setBase(declared);
+  placeCamera(*scene);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);
   return scene;

@@ -68,14 +68,12 @@ class MediaState {
     base_ = medium, exclusive_ = false, hidden_ = 0;
     exclusive_ = baseCounts();
   }
-  /// Entering additive boundary `boundary` whose interior is `medium`.
+  /// Entering additive boundary `boundary` whose interior is `medium`. Those beyond the capacity are left out; the
+  /// builder warns of them.
   VIRGA_HD void enter(int boundary, int medium) {
     for (int i = 0; i < count_; ++i)
       if (inside_[i].boundary == boundary) return;
-    if (count_ < kCapacity)
-      inside_[count_++] = {boundary, medium};
-    else
-      overflowed_ = true;
+    if (count_ < kCapacity) inside_[count_++] = {boundary, medium};
   }
   VIRGA_HD void leave(int boundary, int medium) {
     int kept = 0, hidden = 0;
@@ -98,7 +96,6 @@ class MediaState {
     return hidden_ + i < count_ ? inside_[hidden_ + i].medium : base_;
   }
   VIRGA_HD bool vacuum() const { return count() == 0; }
-  VIRGA_HD bool overflowed() const { return overflowed_; }
 
  private:
   struct Inside {
@@ -115,7 +112,7 @@ class MediaState {
   }
 
   int base_ = kNone;
-  bool exclusive_ = false, overflowed_ = false;
+  bool exclusive_ = false;
   int count_ = 0;
   int hidden_ = 0;  ///< of the first ones: around a shape that replaces by vacuum
   Inside inside_[kCapacity];

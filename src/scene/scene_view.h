@@ -36,7 +36,8 @@ struct SceneView {
   View<EmitterView> emitters;
   DiscreteView emitterChoice;  ///< by power
   int environment = -1;        ///< index of the constant or environment emitter, if any
-  MediaState cameraMedia;      ///< where camera rays start
+  MediaState cameraMedia;      ///< at the point below, from where camera rays cross boundaries to their own starts
+  Vec3 cameraMediaPoint;       ///< a little beside the eye
   Bounds bounds;               ///< of all shapes
   float scale = 1;             ///< [unit] largest coordinate of the bounds
 };

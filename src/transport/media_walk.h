@@ -23,6 +23,13 @@ VIRGA_HD inline MediaRay leaveSurface(const SurfacePoint& point, Vec3 w, const M
   return {{point.originToward(w), w}, media, 4 * point.epsilon, across};
 }
 
+/// A camera ray, whose start may lie behind boundaries that the eye lies before or exactly on.
+VIRGA_HD inline MediaRay leaveCamera(const SceneView& scene, const Ray& ray) {
+  const Vec3 approach = ray.o - scene.cameraMediaPoint;
+  const float behind = length(approach);
+  return {ray, scene.cameraMedia, behind, behind > 0 ? approach / behind : Vec3(0)};
+}
+
 VIRGA_HD inline void applyCrossing(const SceneView& scene, const Crossing& crossing, MediaState& media) {
   const MediumTransition& transition = scene.boundaries[crossing.shape];
   if (transition.replaces) {

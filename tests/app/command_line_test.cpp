@@ -195,6 +195,20 @@ TEST_F(CommandLine, WritesLayersThatSumUpToTheBeautyAndVariances) {
   EXPECT_EQ(picture("f.png").width, 24);
 }
 
+// A lamp whose light overflows close to it.
+TEST_F(CommandLine, SamplesThatAreNoNumbersAreReported) {
+  scratch_.write("glare.xml", R"(<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0, 0, 5" target="0, 0, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
+    <shape type="rectangle"/><emitter type="point"><point name="position" x="0" y="0" z="0.05"/>
+    <rgb name="intensity" value="3e38"/></emitter></scene>)");
+  const Ended r = run({"render", "glare.xml", "--spp", "2", "--stats", "s.json"});
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  const int64_t count = json("s.json")["non_finite_samples"];
+  EXPECT_GT(count, 0);
+  EXPECT_TRUE(contains(r.err, std::to_string(count) + " samples were NaN or infinite")) << r.err;
+}
+
 TEST_F(CommandLine, QuietPrintsNothing) {
   const Ended r = run({"render", "fog.xml", "--spp", "1", "--quiet"});
   EXPECT_EQ(r.exitCode, 0);

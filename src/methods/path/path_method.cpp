@@ -64,7 +64,7 @@ class PathMethod final : public Method {
     const Vec2 offset = scene_->filter.sample(sampler.next2D());
     const CameraRay ray =
         scene_->camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
-    return tracer.trace(ray, distance(ray.ray.o, scene_->camera.toWorld.translation), sampler);
+    return tracer.trace(ray, sampler);
   }
 
   SceneSnapshot scene_;

@@ -28,10 +28,10 @@ class PathTracer {
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
       : scene_(scene), rays_(rays), options_(options), hasSmallLights_(hasSmallLights(scene)) {}
 
-  /// Radiance along a camera ray, layer by layer [W/(m^2 sr)]. `behind`: from the near plane back to the eye [unit].
-  VIRGA_HD LayerRadiance trace(const CameraRay& camera, float behind, Sampler& sampler) const {
+  /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
+  VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler) const {
     Path path;
-    path.at = {camera.ray, scene_.cameraMedia, behind};
+    path.at = leaveCamera(scene_, camera.ray);
     path.tMax = camera.tMax;
     while (extend(path, sampler)) {
     }
