@@ -114,8 +114,10 @@ TEST(RoughConductor, SamplesFollowTheDensity) {
       RoughConductor wrong = metal;
       wrong.facets.alphaX *= 1.06f;
       wrong.facets.alphaY *= 1.06f;
-      EXPECT_GT(samplingP(metal, metal, wo, mirrored(wo)), 1e-4) << nameOf(f) << " " << wo.z;
-      EXPECT_LT(samplingP(metal, wrong, wo, mirrored(wo)), 1e-4) << "cannot fail: " << nameOf(f) << " " << wo.z;
+      // At grazing incidence the horizon cuts through the peak: rings about the normal end there.
+      const Vec3 axis = wo.z < 0.1f ? Vec3(0, 0, 1) : mirrored(wo);
+      EXPECT_GT(samplingP(metal, metal, wo, axis), 1e-4) << nameOf(f) << " " << wo.z;
+      EXPECT_LT(samplingP(metal, wrong, wo, axis), 1e-4) << "cannot fail: " << nameOf(f) << " " << wo.z;
     }
 }
 

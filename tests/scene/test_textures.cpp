@@ -70,7 +70,10 @@ TEST(Bitmap, IsPlacedByToUv) {
     const TextureView t = pictures.texture(word("filter_type", "nearest") +
                                            fmt::format("<transform name=\"to_uv\">{}</transform>", steps));
     size_t i = 0;
-    for (const float e : expected) EXPECT_NEAR(t.lookup(uvs[i]).g, e, 1e-6f) << steps << " " << i, ++i;
+    for (const float e : expected) {
+      EXPECT_NEAR(t.lookup(uvs[i]).g, e, 1e-6f) << steps << " " << i;
+      ++i;
+    }
   };
   expectValues("<scale x=\"2\" y=\"2\"/>", {0.5f, 0.5f, 0.6f, 0.4f});
   expectValues("<translate x=\"0.34\"/>", {0.2f, 0.5f, 0.1f, 0.2f});
