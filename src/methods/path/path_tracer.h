@@ -296,8 +296,9 @@ class PathTracer {
     const SurfaceBsdf& surface = scene_.bsdfs[shape.bsdf];
     const bool back = surface.twoSided && dot(wo, point.geometricNormal) < 0;
     const Vec3 n = back ? -point.shadingNormal : point.shadingNormal;
-    const Frame frame = surface.anisotropic ? Frame(n, surfaceTangent(shape, point.p, hit.primitive)) : Frame(n);
+    Frame frame(n);
     const Bsdf* bsdf = back ? &surface.back : &surface.front;
+    if (surface.anisotropic) frame = Frame(n, surfaceTangent(shape, point.p, hit.primitive));
     if (surface.textured) {
       const Vec2 uv = surfaceUv(shape, point.p, hit.primitive, {hit.u, hit.v});
       textured = bsdfAt(scene_, *bsdf, back ? surface.backTextures : surface.frontTextures, uv);
