@@ -104,6 +104,14 @@ struct Frame {
     s = {1 + sign * z.x * z.x * a, sign * b, -sign * z.x};
     t = {b, sign + z.y * z.y * a, -z.y};
   }
+  /// The same with s as near to `tangent` (any length) as may be; any s where that points along z.
+  VIRGA_HD Frame(Vec3 z, Vec3 tangent) : Frame(z) {
+    const Vec3 across = tangent - z * dot(z, tangent);
+    const float l2 = lengthSquared(across);
+    if (!(l2 > 1e-12f * lengthSquared(tangent))) return;
+    s = across / std::sqrt(l2);
+    t = cross(n, s);
+  }
   VIRGA_HD Vec3 toWorld(Vec3 v) const { return s * v.x + t * v.y + n * v.z; }
   VIRGA_HD Vec3 toLocal(Vec3 v) const { return {dot(s, v), dot(t, v), dot(n, v)}; }
 };

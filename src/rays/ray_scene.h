@@ -21,6 +21,8 @@ class RayShape {
                                                    std::span<const std::array<uint32_t, 3>> triangles);
   static std::shared_ptr<const RayShape> sphere(Vec3 center, float radius);
   static std::shared_ptr<const RayShape> disk(Vec3 center, Vec3 unitNormal, float radius);
+  /// The side of a tube from `end` along `unitAxis`, open at its ends.
+  static std::shared_ptr<const RayShape> cylinder(Vec3 end, Vec3 unitAxis, float radius, float length);
   /// The image of [-1, 1]^3, as a boundary that rays enter and leave.
   static std::shared_ptr<const RayShape> box(const Matrix4& toWorld);
 

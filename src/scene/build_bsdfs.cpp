@@ -6,9 +6,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kNotYet[] = {
-    "roughconductor", "thindielectric", "roughdielectric", "plastic",   "roughplastic",
-    "principled",     "mask",           "bumpmap",         "normalmap", "blendbsdf"};
+constexpr std::string_view kNotYet[] = {"plastic", "roughplastic", "principled", "mask",
+                                        "bumpmap", "normalmap",    "blendbsdf"};
 
 struct NamedIndex {
   std::string_view name;
@@ -61,45 +60,139 @@ float refractiveIndex(PluginReader& reader, std::string_view name, std::string_v
   return kIndices[reader.oneOf(name, fallback, names(kIndices))].ior;
 }
 
-Bsdf buildDiffuse(PluginReader& reader) { return Bsdf(Diffuse{reader.color("reflectance", Rgb(0.5f), reader.unit())}); }
+/// Reads the parameters of one bsdf. Its colours come in the order in which its struct numbers them.
+class BsdfReader {
+ public:
+  BsdfReader(BuildContext& context, PluginReader& plugin) : reader(plugin), context_(context) {}
 
-Bsdf buildPhong(PluginReader& reader) {
-  const Rgb diffuse = reader.color("diffuse_reflectance", Rgb(0.5f), reader.unit());
-  const Rgb specular = reader.color("specular_reflectance", Rgb(0.2f), reader.unit());
+  PluginReader& reader;
+  BsdfTextures textures;  ///< those of the colours so far
+
+  /// The next colour; of a texture, the maximum.
+  Rgb color(std::string_view name, float fallback, const PluginReader::Range& range = PluginReader::unit()) {
+    return scaled(name, Rgb(fallback), range, 1);
+  }
+  Rgb scaled(std::string_view name, Rgb fallback, const PluginReader::Range& range, float scale) {
+    ColorOrTexture c = colorOrTexture(context_, reader, name, fallback, range);
+    int& index = textures.index[next_++];
+    if (c.texture.present()) {
+      index = static_cast<int>(context_.parts.textures.size());
+      c.texture.scale = scale;
+      context_.parts.textures.push_back(c.texture);
+    }
+    return c.maximum * scale;
+  }
+
+ private:
+  BuildContext& context_;
+  int next_ = 0;
+};
+
+Bsdf buildDiffuse(BsdfReader& in) { return Bsdf(Diffuse{in.color("reflectance", 0.5f)}); }
+
+Bsdf buildPhong(BsdfReader& in) {
+  const Rgb diffuse = in.color("diffuse_reflectance", 0.5f), specular = in.color("specular_reflectance", 0.2f);
   if (maxComponent(diffuse + specular) > 1)
-    reader.fail("specular_reflectance", "diffuse and specular reflectance add up to more than 1");
-  return Bsdf(Phong{diffuse, specular, reader.number("exponent", 30, reader.nonNegative())});
+    in.reader.fail("specular_reflectance", "diffuse and specular reflectance add up to more than 1",
+                   in.textures.any() ? "the largest values of textures count, wherever they lie" : "");
+  return Bsdf(Phong{diffuse, specular, in.reader.number("exponent", 30, PluginReader::nonNegative())});
 }
 
-Bsdf buildConductor(PluginReader& reader) {
-  NamedMetal metal = kMetals[1];
+// Colours 0 to 2: eta, k, reflectance.
+Conductor readConductor(BsdfReader& in) {
+  PluginReader& reader = in.reader;
+  NamedMetal metal = kMetals[0];
   const bool byNumbers = reader.has("eta") || reader.has("k");
   if (byNumbers && reader.has("material"))
     reader.fail("material", "give either \"material\" or \"eta\" and \"k\", not both");
-  if (!byNumbers) metal = kMetals[reader.oneOf("material", "Cu", names(kMetals))];
-  const Rgb eta = reader.color("eta", metal.eta), k = reader.color("k", metal.k);
-  const float outside = refractiveIndex(reader, "ext_eta", "air");
-  return Bsdf(Conductor{eta / outside, k / outside, reader.color("specular_reflectance", Rgb(1.f), reader.unit())});
+  if (!byNumbers) metal = kMetals[reader.oneOf("material", "none", names(kMetals))];
+  const float scale = 1 / refractiveIndex(reader, "ext_eta", "vacuum");
+  const Rgb eta = in.scaled("eta", metal.eta, reader.nonNegative(), scale);
+  const Rgb k = in.scaled("k", metal.k, reader.nonNegative(), scale);
+  return {eta, k, in.color("specular_reflectance", 1)};
 }
 
-Bsdf buildDielectric(PluginReader& reader) {
-  const float eta = refractiveIndex(reader, "int_ior", "bk7") / refractiveIndex(reader, "ext_ior", "air");
-  return Bsdf(Dielectric{eta, reader.color("specular_reflectance", Rgb(1.f), reader.unit()),
-                         reader.color("specular_transmittance", Rgb(1.f), reader.unit())});
+Microfacet readFacets(PluginReader& reader) {
+  static constexpr std::string_view kDistributions[] = {"beckmann", "ggx"};
+  constexpr float kSmoothest = 1e-4f;  // as in Mitsuba 3: below it, single precision cannot tell facets apart
+  const bool apart = reader.has("alpha_u") || reader.has("alpha_v");
+  if (apart && (!reader.has("alpha_u") || !reader.has("alpha_v")))
+    reader.fail(reader.has("alpha_u") ? "alpha_u" : "alpha_v", "\"alpha_u\" and \"alpha_v\" come together");
+  if (apart && reader.has("alpha")) reader.fail("alpha", "give either \"alpha\" or \"alpha_u\" and \"alpha_v\"");
+  const auto alpha = [&](std::string_view name) {
+    return std::max(reader.number(name, 0.1f, PluginReader::nonNegative()), kSmoothest);
+  };
+  Microfacet facets;
+  facets.kind = static_cast<Microfacet::Kind>(reader.oneOf("distribution", "beckmann", kDistributions));
+  facets.sampling = reader.boolean("sample_visible", true) ? Microfacet::Sampling::visible : Microfacet::Sampling::all;
+  facets.alphaX = alpha(apart ? "alpha_u" : "alpha");
+  facets.alphaY = alpha(apart ? "alpha_v" : "alpha");
+  return facets;
 }
 
-using Build = Bsdf (*)(PluginReader&);
-constexpr PluginRow<Build> kBsdfs[] = {{"diffuse", buildDiffuse},     {"phong", buildPhong},
-                                       {"conductor", buildConductor}, {"dielectric", buildDielectric},
-                                       {"twosided", nullptr},         {"null", nullptr}};
+// Colours 0 and 1: reflectance, transmittance.
+Dielectric readDielectric(BsdfReader& in) {
+  const float eta = refractiveIndex(in.reader, "int_ior", "bk7") / refractiveIndex(in.reader, "ext_ior", "air");
+  const Rgb reflectance = in.color("specular_reflectance", 1);
+  return {eta, reflectance, in.color("specular_transmittance", 1)};
+}
 
-Bsdf buildOneSided(BuildContext& context, const Node& node) {
+Bsdf buildConductor(BsdfReader& in) { return Bsdf(readConductor(in)); }
+
+Bsdf buildRoughConductor(BsdfReader& in) {
+  const Conductor smooth = readConductor(in);
+  return Bsdf(RoughConductor{readFacets(in.reader), smooth.eta, smooth.k, smooth.reflectance});
+}
+
+Bsdf buildDielectric(BsdfReader& in) { return Bsdf(readDielectric(in)); }
+
+Bsdf buildThinDielectric(BsdfReader& in) {
+  const Dielectric one = readDielectric(in);
+  return Bsdf(ThinDielectric{one.eta, one.reflectance, one.transmittance});
+}
+
+Bsdf buildRoughDielectric(BsdfReader& in) {
+  const Dielectric smooth = readDielectric(in);
+  if (smooth.eta == 1)
+    in.reader.failHere("the indices inside and outside are equal: no facet would bend light",
+                       "give \"int_ior\" and \"ext_ior\" that differ, or take a \"null\" bsdf");
+  return Bsdf(RoughDielectric{readFacets(in.reader), smooth.eta, smooth.reflectance, smooth.transmittance});
+}
+
+using Build = Bsdf (*)(BsdfReader&);
+constexpr PluginRow<Build> kBsdfs[] = {{"diffuse", buildDiffuse},
+                                       {"phong", buildPhong},
+                                       {"conductor", buildConductor},
+                                       {"dielectric", buildDielectric},
+                                       {"thindielectric", buildThinDielectric},
+                                       {"roughconductor", buildRoughConductor},
+                                       {"roughdielectric", buildRoughDielectric},
+                                       {"twosided", nullptr},
+                                       {"null", nullptr}};
+
+struct OneSide {
+  Bsdf bsdf;
+  BsdfTextures textures;
+};
+
+OneSide buildOneSided(BuildContext& context, const Node& node) {
   const Build build = findPlugin(node, kBsdfs, kNotYet);
   PluginReader reader(node, context.diagnostics);
   if (!build) reader.failHere(fmt::format("bsdf \"{}\" has no place in a twosided one", node.type));
-  const Bsdf bsdf = build(reader);
+  BsdfReader in(context, reader);
+  const Bsdf bsdf = build(in);
   reader.finish();
-  return bsdf;
+  return {bsdf, in.textures};
+}
+
+SurfaceBsdf surfaceOf(const OneSide& front, const OneSide& back) {
+  return {front.bsdf,
+          back.bsdf,
+          false,
+          front.textures.any() || back.textures.any(),
+          front.bsdf.anisotropic() || back.bsdf.anisotropic(),
+          front.textures,
+          back.textures};
 }
 
 SurfaceBsdf buildTwoSided(BuildContext& context, const Node& node) {
@@ -107,7 +200,8 @@ SurfaceBsdf buildTwoSided(BuildContext& context, const Node& node) {
   const std::vector<NodePtr> sides = reader.children("bsdf");
   reader.finish();
   if (sides.empty() || sides.size() > 2) reader.failHere("a twosided bsdf holds one or two others");
-  const SurfaceBsdf result{buildOneSided(context, *sides.front()), buildOneSided(context, *sides.back()), true};
+  SurfaceBsdf result = surfaceOf(buildOneSided(context, *sides.front()), buildOneSided(context, *sides.back()));
+  result.twoSided = true;
   if (result.front.transmits() || result.back.transmits())
     reader.failHere("only bsdfs that reflect can be made twosided");
   return result;
@@ -126,7 +220,7 @@ int buildBsdf(BuildContext& context, const Node& node) {
   else if (node.type == "twosided")
     bsdf = buildTwoSided(context, node);
   else
-    bsdf = {buildOneSided(context, node), Bsdf(), false};
+    bsdf = surfaceOf(buildOneSided(context, node), {});
   const int index = static_cast<int>(context.parts.bsdfs.size());
   context.parts.bsdfs.push_back(bsdf);
   context.bsdfIndex[&node] = index;

@@ -65,6 +65,17 @@ std::string parameterKey(const Node& node);
 /// Path and time of last change: a key of a file's content.
 std::string fileKey(const std::filesystem::path& path);
 
+/// A colour of a plugin, or a texture in its place.
+struct ColorOrTexture {
+  Rgb maximum, mean;    ///< of a texture: by channel, over its picture; of a colour: that
+  TextureView texture;  ///< present() where it is one
+};
+/// A parameter that may be a texture; every channel of all its values within the range.
+ColorOrTexture colorOrTexture(BuildContext&, PluginReader&, std::string_view name, Rgb fallback,
+                              const PluginReader::Range& range);
+/// Throws what is wrong with a texture that stands in the scene for others to refer to.
+void checkTexture(BuildContext&, const Node& texture);
+
 void buildSensor(BuildContext&, const Node& sensor);
 void buildIntegrator(BuildContext&, const Node& integrator);
 int buildBsdf(BuildContext&, const Node& bsdf);      ///< index into parts.bsdfs

@@ -184,7 +184,9 @@ void addAreaEmitter(BuildContext& context, const Node& node, int surface, const 
   PluginReader reader(node, context.diagnostics);
   EmitterView e;
   e.kind = EmitterView::Kind::area;
-  e.value = reader.color("radiance", Rgb(1.f));
+  const ColorOrTexture radiance = colorOrTexture(context, reader, "radiance", Rgb(1.f), reader.nonNegative());
+  e.value = radiance.mean;
+  e.texture = radiance.texture;
   e.shape = surface;
   e.triangles = shape.triangleChoice.view();
   e.area = shape.area;

@@ -7,8 +7,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kNotYet[] = {"cylinder",   "gltf",         "shapegroup",  "instance",
-                                        "serialized", "bsplinecurve", "linearcurve", "sdfgrid"};
+constexpr std::string_view kNotYet[] = {"gltf",         "shapegroup",  "instance", "serialized",
+                                        "bsplinecurve", "linearcurve", "sdfgrid"};
 
 /// What a shape's surface is for: to be seen, also to hold a medium, or only that. Boundaries need no triangles where
 /// an analytic form will do.
@@ -38,6 +38,7 @@ void finishMesh(BuiltShape& shape, Role role) {
   shape.view.kind = ShapeView::Kind::mesh;
   shape.view.positions = mesh.positions.data();
   shape.view.normals = mesh.normals.empty() ? nullptr : mesh.normals.data();
+  shape.view.uvs = mesh.uvs.empty() ? nullptr : mesh.uvs.data();
   shape.view.triangles = mesh.triangles.data();
   shape.rays = RayShape::triangles(mesh.positions, mesh.triangles);
   measure(shape);
@@ -70,18 +71,43 @@ void turnOutward(TriangleMesh& mesh) {
 void buildRectangle(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape) {
   const Matrix4 toWorld = reader.transform("to_world");
   shape.mesh.positions = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
+  shape.mesh.uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   shape.mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
   finishMesh(shape, role);
 }
 
+// Texture coordinates on the face of the unit cube with that outward normal, as in Mitsuba 3.
+Vec2 cubeUv(Vec3 normal, Vec3 p) {
+  const Vec2 uv = normal.x != 0  ? Vec2{p.y, normal.x > 0 ? -p.z : p.z}
+                  : normal.y > 0 ? Vec2{-p.x, -p.z}
+                  : normal.y < 0 ? Vec2{p.z, p.x}
+                                 : Vec2{normal.z > 0 ? p.y : -p.y, p.x};
+  return {0.5f * (1 + uv.x), 0.5f * (1 + uv.y)};
+}
+
+TriangleMesh unitCube() {
+  // Corners of the faces, counterclockwise from outside; bit i of a corner's number is its place along axis i.
+  constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
+  const Bounds unit{Vec3(-1), Vec3(1)};
+  TriangleMesh mesh;
+  for (uint32_t face = 0; face < 6; ++face) {
+    Vec3 normal;
+    normal[static_cast<int>(face / 2)] = face % 2 == 0 ? -1.f : 1.f;
+    for (const int corner : kFaces[face]) {
+      mesh.positions.push_back(unit.corner(corner));
+      mesh.uvs.push_back(cubeUv(normal, mesh.positions.back()));
+    }
+    mesh.triangles.push_back({4 * face, 4 * face + 1, 4 * face + 2});
+    mesh.triangles.push_back({4 * face, 4 * face + 2, 4 * face + 3});
+  }
+  return mesh;
+}
+
 void buildCube(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape) {
   const Matrix4 toWorld = reader.transform("to_world");
-  const Bounds unit{Vec3(-1), Vec3(1)};
-  for (int i = 0; i < 8; ++i) shape.mesh.positions.push_back(unit.corner(i));
-  shape.mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
-                          {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
+  shape.mesh = unitCube();
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
   finishMesh(shape, role);
@@ -102,6 +128,13 @@ float evenScale(PluginReader& reader, const Affine& map, int axes) {
   return scale;
 }
 
+// Where texture coordinates begin.
+void placeAxes(ShapeView& view, const Affine& map) {
+  view.axisX = normalize(map.x);
+  view.axisY = normalize(map.y);
+  view.axisZ = normalize(map.z);
+}
+
 void buildSphere(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   const Affine map(reader.transform("to_world"));
   const float radius = evenScale(reader, map, 3) * reader.number("radius", 1, reader.positive());
@@ -109,6 +142,7 @@ void buildSphere(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   shape.view.kind = ShapeView::Kind::sphere;
   shape.view.center = center;
   shape.view.radius = radius;
+  placeAxes(shape.view, map);
   shape.rays = RayShape::sphere(center, radius);
   shape.area = 4 * kPi * radius * radius;
   shape.bounds = {center - Vec3(radius), center + Vec3(radius)};
@@ -122,10 +156,44 @@ void buildDisk(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   shape.view.center = map.translation;
   shape.view.normal = normalize(Affine(toWorld.inverse()).transposed({0, 0, 1}));
   shape.view.radius = radius;
+  placeAxes(shape.view, map);
   shape.rays = RayShape::disk(map.translation, shape.view.normal, radius);
   shape.area = kPi * radius * radius;
   shape.openEdges = 1;
   shape.bounds = {map.translation - Vec3(radius), map.translation + Vec3(radius)};
+}
+
+// The unit tube along z, radius 1, to the one that the parameters mean.
+Matrix4 cylinderToWorld(PluginReader& reader) {
+  const Vec3 p0 = reader.vector("p0", {0, 0, 0}), p1 = reader.vector("p1", {0, 0, 1});
+  const float radius = reader.number("radius", 1, reader.positive()), length = distance(p0, p1);
+  if (!(length > 0)) reader.fail("p1", "\"p0\" and \"p1\" are the same point");
+  const Frame frame((p1 - p0) / length);
+  const Vec3 columns[] = {frame.s * radius, frame.t * radius, p1 - p0, p0};
+  Matrix4 local;
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 3; ++row) local(row, column) = static_cast<double>(columns[column][row]);
+  return reader.transform("to_world") * local;
+}
+
+void buildCylinder(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
+  const Affine map(cylinderToWorld(reader));
+  const float radius = evenScale(reader, map, 2), length = virga::length(map.z);
+  if (std::fabs(dot(map.z, map.x)) + std::fabs(dot(map.z, map.y)) > 1e-4f * length * radius)
+    reader.fail("to_world", "a cylinder's transform must not shear it", "use a mesh for a slanted tube");
+  ShapeView& view = shape.view;
+  view.kind = ShapeView::Kind::cylinder;
+  view.center = map.translation;
+  placeAxes(view, map);
+  view.normal = view.axisZ;
+  view.radius = radius;
+  view.length = length;
+  shape.rays = RayShape::cylinder(view.center, view.normal, radius, length);
+  shape.area = kTwoPi * radius * length;
+  for (const Vec3 end : {view.center, view.center + view.normal * length}) {
+    shape.bounds.extend(end - Vec3(radius));
+    shape.bounds.extend(end + Vec3(radius));
+  }
 }
 
 template <MeshFormat format>
@@ -137,7 +205,9 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShap
     throw error.at(reader.positionOf("filename"));
   }
   if (reader.boolean("face_normals", false)) shape.mesh.normals.clear();
-  reader.ignore("flip_tex_coords");
+  // The pictures of OBJ files begin below, Mitsuba's above.
+  if (reader.boolean("flip_tex_coords", format == MeshFormat::obj))
+    for (Vec2& uv : shape.mesh.uvs) uv.y = 1 - uv.y;
   toWorldSpace(shape.mesh, reader.transform("to_world"));
   if (role != Role::surface) makeWindingAgree(shape.mesh);
   if (role == Role::boundary) turnOutward(shape.mesh);
@@ -145,9 +215,13 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShap
 }
 
 using Build = void (*)(BuildContext&, PluginReader&, Role, BuiltShape&);
-constexpr PluginRow<Build> kShapes[] = {
-    {"sphere", buildSphere}, {"rectangle", buildRectangle},       {"cube", buildCube},
-    {"disk", buildDisk},     {"obj", buildMesh<MeshFormat::obj>}, {"ply", buildMesh<MeshFormat::ply>}};
+constexpr PluginRow<Build> kShapes[] = {{"sphere", buildSphere},
+                                        {"rectangle", buildRectangle},
+                                        {"cube", buildCube},
+                                        {"disk", buildDisk},
+                                        {"cylinder", buildCylinder},
+                                        {"obj", buildMesh<MeshFormat::obj>},
+                                        {"ply", buildMesh<MeshFormat::ply>}};
 
 // Geometry by its parameters: what hangs on the shape (materials, media, lights) may change without building it again.
 std::shared_ptr<const BuiltShape> geometry(BuildContext& context, PluginReader& reader, Role role) {
@@ -190,7 +264,9 @@ void warnIfOpen(PluginReader& reader, const MediumTransition& media, const Built
 
 // A shape without a bsdf is a grey one; a lamp without one is black (as Mitsuba has it).
 int defaultBsdf(BuildContext& context, bool emits) {
-  context.parts.bsdfs.push_back({Bsdf(Diffuse{emits ? Rgb(0.f) : Rgb(0.5f)}), Bsdf(), false});
+  SurfaceBsdf grey;
+  grey.front = Bsdf(Diffuse{emits ? Rgb(0.f) : Rgb(0.5f)});
+  context.parts.bsdfs.push_back(grey);
   return static_cast<int>(context.parts.bsdfs.size()) - 1;
 }
 
@@ -199,6 +275,15 @@ void addBoundary(BuildContext& context, MediumTransition media, std::shared_ptr<
   if (!media.declared()) return;  // nothing on either side: the shape is invisible
   context.parts.boundaries.push_back(media);
   context.parts.boundaryShapes.push_back(std::move(shape));
+}
+
+void warnOfOpenEnds(BuildContext& context, PluginReader& reader, const MediumTransition& media) {
+  if (media.interior == MediumTransition::kNone && media.exterior == MediumTransition::kNone) return;
+  const std::string where = reader.node().hasGeneratedId() ? "" : fmt::format(" \"{}\"", reader.node().id);
+  context.diagnostics.warnings.push_back(
+      fmt::format("warning: the cylinder{} is open at its ends: light that passes them does not cross the boundary of "
+                  "its medium; close it with a mesh",
+                  where));
 }
 
 }  // namespace
@@ -213,6 +298,7 @@ void buildShape(BuildContext& context, const Node& node) {
   MediumTransition media = mediaOf(context, reader);
   warnIfOpen(reader, media, *shape);
   reader.finish();
+  if (shape->view.kind == ShapeView::Kind::cylinder) warnOfOpenEnds(context, reader, media);
   if (bsdf) buildBsdf(context, *bsdf);
   if (null) return addBoundary(context, media, std::move(shape));
 

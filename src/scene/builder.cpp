@@ -31,6 +31,7 @@ void linkViews(Scene& scene, const Scene::Parts& parts) {
   view.surfaces = viewOf(parts.surfaces);
   view.boundaries = viewOf(parts.boundaries);
   view.bsdfs = viewOf(parts.bsdfs);
+  view.textures = viewOf(parts.textures);
   view.media = viewOf(parts.media);
   view.emitters = viewOf(parts.emitters);
   view.emitterChoice = parts.emitterChoice.view();
@@ -63,7 +64,8 @@ void warnOfDarkness(BuildContext& context) {
   const bool points =
       std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
   const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
-    return parts.bsdfs[static_cast<size_t>(s.bsdf)].front.transmits();
+    const Bsdf& front = parts.bsdfs[static_cast<size_t>(s.bsdf)].front;
+    return front.specular() && front.transmits();
   });
   if (points && glass)
     context.diagnostics.warnings.push_back(
@@ -142,6 +144,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   for (const NodePtr& emitter : reader.children("emitter")) buildEmitter(context, *emitter);
   // Definitions for others to refer to; checked even where nobody does.
   for (const NodePtr& bsdf : reader.children("bsdf")) buildBsdf(context, *bsdf);
+  for (const NodePtr& texture : reader.children("texture")) checkTexture(context, *texture);
   for (const NodePtr& medium : reader.children("medium")) buildMedium(context, *medium);
   for (const char* tag : {"phase", "volume", "film", "rfilter", "sampler"}) reader.ignoreChildren(tag);
   const NodePtr sensor = onlyChild(reader, "sensor");

@@ -6,6 +6,7 @@
 #include "core/transform.h"
 #include "core/warp.h"
 #include "scene/shape.h"
+#include "scene/texture.h"
 
 namespace virga {
 
@@ -78,13 +79,14 @@ struct EmitterView {
   enum class Kind : uint8_t { point, spot, directional, area, constant, environment };
 
   Kind kind = Kind::point;
-  Rgb value;       ///< intensity [W/sr], irradiance across the beam [W/m^2] or radiance [W/(m^2 sr)]
-  Vec3 position;   ///< point, spot
-  Vec3 direction;  ///< spot, directional: unit, in which the light travels
+  Rgb value;  ///< intensity [W/sr], irradiance across the beam [W/m^2] or radiance [W/(m^2 sr)]; its mean, if textured
+  Vec3 position;                         ///< point, spot
+  Vec3 direction;                        ///< spot, directional: unit, in which the light travels
   float cutoffAngle = 0, beamWidth = 0;  ///< spot [rad]
   int shape = -1;                        ///< area: index of its surface
   DiscreteView triangles;                ///< area, mesh: by area
   float area = 0;                        ///< area [unit^2]
+  TextureView texture;                   ///< area: radiance over the surface, in place of `value`
   EnvironmentView environment;
 
   VIRGA_HD bool infinite() const {
@@ -94,6 +96,9 @@ struct EmitterView {
   VIRGA_HD bool isDelta() const { return kind == Kind::point || kind == Kind::spot || kind == Kind::directional; }
   /// Has positions at a finite distance to aim at (equiangular sampling).
   VIRGA_HD bool isLocal() const { return !infinite(); }
+
+  /// Radiance of an area light where its surface has these texture coordinates.
+  VIRGA_HD Rgb radianceAt(Vec2 uv) const { return texture.present() ? texture.lookup(uv) : value; }
 
   /// Radiant intensity toward unit direction w of a point or spot light [W/sr]. Spot: full within the beam width,
   /// linear in the angle down to 0 at the cutoff.
@@ -122,25 +127,40 @@ struct LightPoint {
   Vec3 normal;        ///< of an area light
   float areaPdf = 0;  ///< [1/unit^2]; 1 for point-like lights; 0: no sample
   bool pointLike = false;
+  Vec2 uv{};  ///< on a textured area light
 };
+
+/// Texture coordinates of a point on a light; of no interest where it is of one colour.
+VIRGA_HD inline Vec2 lightUv(const ShapeView& shape, const EmitterView& emitter, Vec3 p, uint32_t primitive = 0,
+                             Vec2 barycentric = {}) {
+  return emitter.texture.present() ? surfaceUv(shape, p, primitive, barycentric) : Vec2();
+}
 
 VIRGA_HD inline LightPoint uniformPointOnShape(const ShapeView& shape, const EmitterView& emitter, Vec2 u) {
   if (shape.kind == ShapeView::Kind::sphere) {
     const Vec3 n = uniformSphere(u);
-    return {shape.center + n * shape.radius, n * shape.orientation, 1 / emitter.area, false};
+    const Vec3 p = shape.center + n * shape.radius;
+    return {p, n * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
+  }
+  if (shape.kind == ShapeView::Kind::cylinder) {
+    const float phi = kTwoPi * u.x;
+    const Vec3 n = shape.axisX * std::cos(phi) + shape.axisY * std::sin(phi);
+    const Vec3 p = shape.center + shape.normal * (u.y * shape.length) + n * shape.radius;
+    return {p, n * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
   }
   if (shape.kind == ShapeView::Kind::disk) {
     const Vec2 d = uniformDisk(u);
     const Frame frame(shape.normal);
-    return {shape.center + (frame.s * d.x + frame.t * d.y) * shape.radius, shape.normal * shape.orientation,
-            1 / emitter.area, false};
+    const Vec3 p = shape.center + (frame.s * d.x + frame.t * d.y) * shape.radius;
+    return {p, shape.normal * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
   }
   const auto pick = emitter.triangles.sample(u.x);
   const auto& triangle = shape.triangles[pick.index];
   const Vec3 a = shape.positions[triangle[0]], b = shape.positions[triangle[1]], c = shape.positions[triangle[2]];
   const Vec2 uv = uniformTriangle({pick.remapped, u.y});
-  return {a * (1 - uv.x - uv.y) + b * uv.x + c * uv.y, normalize(cross(b - a, c - a)) * shape.orientation,
-          1 / emitter.area, false};
+  const Vec3 p = a * (1 - uv.x - uv.y) + b * uv.x + c * uv.y;
+  return {p, normalize(cross(b - a, c - a)) * shape.orientation, 1 / emitter.area, false,
+          lightUv(shape, emitter, p, static_cast<uint32_t>(pick.index), uv)};
 }
 
 /// 1 - cos of the half angle under which a sphere is seen from distance d > radius, without cancellation.
@@ -183,7 +203,7 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
   const float cosLight = -dot(on.normal, wi);
   if (cosLight <= 0) return {};
   const float pdf = on.areaPdf * d2 / cosLight;
-  return {wi, d, emitter.value, pdf, false, pdf};
+  return {wi, d, emitter.radianceAt(on.uv), pdf, false, pdf};
 }
 
 VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
@@ -198,7 +218,9 @@ VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const Emit
   const float half = std::sqrt(std::fmax(0.f, shape.radius * shape.radius - miss2));
   const float t = std::fmax(0.f, d * local.z - half);
   const float uniform = half > 0 ? t * t * shape.radius / (half * emitter.area) : 0;
-  return {Frame(toCenter / d).toWorld(local), t, emitter.value, 1 / (kTwoPi * height), false, uniform};
+  const Vec3 wi = Frame(toCenter / d).toWorld(local);
+  const Rgb radiance = emitter.radianceAt(lightUv(shape, emitter, x + wi * t));
+  return {wi, t, radiance, 1 / (kTwoPi * height), false, uniform};
 }
 
 }  // namespace virga

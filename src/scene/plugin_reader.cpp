@@ -129,7 +129,7 @@ Rgb PluginReader::color(std::string_view name, Rgb fallback, const Range& range)
   else if (const auto* d = std::get_if<double>(&p->value))
     result = Rgb(static_cast<float>(*d));
   else if (const auto* n = std::get_if<NodePtr>(&p->value); n && (*n)->tag == "texture")
-    fail(name, fmt::format("textures (\"{}\") are not supported yet", (*n)->type), "give an rgb value");
+    fail(name, fmt::format("\"{}\" cannot be a texture", name), "give an rgb value");
   else
     fail(name, fmt::format("\"{}\" must be an rgb value, not a {}", name, typeName(p->value)));
   for (int i = 0; i < 3; ++i) checkedNumber(name, static_cast<double>(result[i]), range);

@@ -19,7 +19,7 @@ struct BuiltShape {
   ShapeView view;  ///< geometry only
   std::shared_ptr<const RayShape> rays;
   Bounds bounds;
-  TriangleMesh mesh;        ///< world space; empty for spheres, disks and boxes
+  TriangleMesh mesh;        ///< world space; empty for spheres, disks and cylinders
   Discrete triangleChoice;  ///< by area
   float area = 0;           ///< [unit^2]
   bool box = false;         ///< a cube as a boundary
@@ -46,6 +46,7 @@ struct PartCache {
   std::map<std::string, std::shared_ptr<const Grid>> grids;
   std::map<std::string, std::shared_ptr<const RgbGrid>> rgbGrids;
   std::map<std::string, std::shared_ptr<const BuiltEnvironment>> environments;
+  std::map<std::string, std::shared_ptr<const Image>> pictures;  ///< of textures
 };
 
 struct Scene::Parts {
@@ -54,6 +55,7 @@ struct Scene::Parts {
   std::vector<ShapeView> surfaces;
   std::vector<MediumTransition> boundaries;
   std::vector<SurfaceBsdf> bsdfs;
+  std::vector<TextureView> textures;
   std::vector<MediumView> media;
   std::vector<std::shared_ptr<const PhaseTable>> phaseTables;
   std::vector<std::shared_ptr<const BuiltMixture>> phaseMixtures;

@@ -6,6 +6,7 @@
 #include "scene/emitter.h"
 #include "scene/medium.h"
 #include "scene/shape.h"
+#include "scene/texture.h"
 
 namespace virga {
 
@@ -21,10 +22,21 @@ struct View {
   VIRGA_HD const T* end() const { return data + size; }
 };
 
+/// Which of a bsdf's colours are textures: their indices in the scene, in the order of the bsdf's colours; -1: none.
+struct BsdfTextures {
+  static constexpr int kCapacity = 3;
+  int index[kCapacity] = {-1, -1, -1};
+
+  VIRGA_HD bool any() const { return index[0] >= 0 || index[1] >= 0 || index[2] >= 0; }
+};
+
 /// A surface's scattering, with a side each.
 struct SurfaceBsdf {
   Bsdf front, back;
-  bool twoSided = false;  ///< `back` is for the inside, in a frame turned over
+  bool twoSided = false;     ///< `back` is for the inside, in a frame turned over
+  bool textured = false;     ///< some colour is a texture: see bsdfAt()
+  bool anisotropic = false;  ///< the frame's tangent matters
+  BsdfTextures frontTextures{}, backTextures{};
 };
 
 /// Everything a kernel needs to know of a scene, besides its rays. Plain data; the Scene owns what it points to.
@@ -32,6 +44,7 @@ struct SceneView {
   View<ShapeView> surfaces;           ///< in the order of the surfaces' RayScene
   View<MediumTransition> boundaries;  ///< in the order of the boundaries' RayScene
   View<SurfaceBsdf> bsdfs;
+  View<TextureView> textures;
   View<MediumView> media;
   View<EmitterView> emitters;
   DiscreteView emitterChoice;  ///< by power
@@ -41,6 +54,13 @@ struct SceneView {
   Bounds bounds;               ///< of all shapes
   float scale = 1;             ///< [unit] largest coordinate of the bounds
 };
+
+/// A bsdf with the colours that its textures have at uv.
+VIRGA_HD inline Bsdf bsdfAt(const SceneView& scene, Bsdf bsdf, const BsdfTextures& textures, Vec2 uv) {
+  for (int i = 0; i < BsdfTextures::kCapacity; ++i)
+    if (textures.index[i] >= 0) bsdf.setColor(i, scene.textures[textures.index[i]].lookup(uv));
+  return bsdf;
+}
 
 /// Samples an emitter as seen from x; pdf counts directions, not the choice of the emitter.
 VIRGA_HD inline LightSample sampleLight(const SceneView& scene, const EmitterView& emitter, Vec3 x, Vec2 u) {

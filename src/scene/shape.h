@@ -12,15 +12,17 @@ namespace virga {
 
 /// A surface's geometry in world coordinates, to find out about a hit.
 struct ShapeView {
-  enum class Kind : uint8_t { mesh, sphere, disk };
+  enum class Kind : uint8_t { mesh, sphere, disk, cylinder };
 
   Kind kind = Kind::mesh;
   const Vec3* positions = nullptr;
   const Vec3* normals = nullptr;  ///< per vertex, or null
+  const Vec2* uvs = nullptr;      ///< per vertex, or null
   const std::array<uint32_t, 3>* triangles = nullptr;
-  Vec3 center, normal;  ///< sphere, disk
-  float radius = 0;
-  float orientation = 1;  ///< -1: normals are flipped
+  Vec3 center, normal;  ///< sphere, disk; cylinder: one end, and the unit direction to the other
+  float radius = 0, length = 0;
+  Vec3 axisX{1, 0, 0}, axisY{0, 1, 0}, axisZ{0, 0, 1};  ///< unit images of the axes: where u and v begin
+  float orientation = 1;                                ///< -1: normals are flipped
 
   int bsdf = 0;
   int emitter = -1;  ///< index of the area emitter on it
@@ -64,6 +66,12 @@ VIRGA_HD inline SurfacePoint surfacePoint(const ShapeView& shape, const Ray& ray
     const Vec3 outward = normalize(ray.at(hit.t) - shape.center);
     s.p = shape.center + outward * shape.radius;
     s.geometricNormal = s.shadingNormal = outward * shape.orientation;
+  } else if (shape.kind == ShapeView::Kind::cylinder) {
+    const Vec3 q = ray.at(hit.t) - shape.center;
+    const float along = clamp(dot(q, shape.normal), 0, shape.length);
+    const Vec3 outward = normalize(q - shape.normal * dot(q, shape.normal));
+    s.p = shape.center + shape.normal * along + outward * shape.radius;
+    s.geometricNormal = s.shadingNormal = outward * shape.orientation;
   } else {
     const Vec3 q = ray.at(hit.t);
     s.p = q - shape.normal * dot(q - shape.center, shape.normal);
@@ -71,6 +79,42 @@ VIRGA_HD inline SurfacePoint surfacePoint(const ShapeView& shape, const Ray& ray
   }
   s.epsilon = kHitError * std::max(maxComponent(abs(s.p)), 1e-2f * sceneScale);
   return s;
+}
+
+/// Azimuth about z, in turns from 0 to 1.
+VIRGA_HD inline float turns(float x, float y) {
+  const float t = std::atan2(y, x) * (0.5f * kInvPi);
+  return t < 0 ? t + 1 : t;
+}
+
+/// Texture coordinates of a point, as in Mitsuba 3: sphere (azimuth, polar angle), disk (radius, azimuth), cylinder
+/// (azimuth, height), each in [0, 1]; mesh: those of its vertices, and without any the weights of the second and third.
+VIRGA_HD inline Vec2 surfaceUv(const ShapeView& shape, Vec3 p, uint32_t primitive, Vec2 barycentric) {
+  if (shape.kind == ShapeView::Kind::mesh) {
+    if (!shape.uvs) return barycentric;
+    const auto& triangle = shape.triangles[primitive];
+    return shape.uvs[triangle[0]] * (1 - barycentric.x - barycentric.y) + shape.uvs[triangle[1]] * barycentric.x +
+           shape.uvs[triangle[2]] * barycentric.y;
+  }
+  const Vec3 q = p - shape.center;
+  const float x = dot(q, shape.axisX), y = dot(q, shape.axisY);
+  if (shape.kind == ShapeView::Kind::disk) return {std::sqrt(x * x + y * y) / shape.radius, turns(x, y)};
+  if (shape.kind == ShapeView::Kind::cylinder) return {turns(x, y), dot(q, shape.normal) / shape.length};
+  return {turns(x, y), std::acos(clamp(dot(q, shape.axisZ) / shape.radius, -1, 1)) * kInvPi};
+}
+
+/// A vector along which u grows (or falls, on a mirrored shape) while v stays; of any length, along the surface.
+VIRGA_HD inline Vec3 surfaceTangent(const ShapeView& shape, Vec3 p, uint32_t primitive) {
+  if (shape.kind == ShapeView::Kind::sphere) return cross(shape.axisZ, p - shape.center);
+  if (shape.kind == ShapeView::Kind::cylinder) return cross(shape.normal, p - shape.center);
+  if (shape.kind == ShapeView::Kind::disk) return lengthSquared(p - shape.center) > 0 ? p - shape.center : shape.axisX;
+  const auto& triangle = shape.triangles[primitive];
+  const Vec3 a = shape.positions[triangle[0]];
+  const Vec3 ab = shape.positions[triangle[1]] - a, ac = shape.positions[triangle[2]] - a;
+  if (!shape.uvs) return ab;
+  const Vec2 b = shape.uvs[triangle[1]] - shape.uvs[triangle[0]], c = shape.uvs[triangle[2]] - shape.uvs[triangle[0]];
+  const float determinant = b.x * c.y - b.y * c.x;
+  return determinant == 0 ? ab : (ab * c.y - ac * b.y) * (determinant < 0 ? -1.f : 1.f);
 }
 
 }  // namespace virga

@@ -65,6 +65,24 @@ TEST(Furnace, GlassAndMirrorAreWhite) {
     <shape type="sphere"><point name="center" x="1.2" y="0" z="0"/><bsdf type="conductor"><string name="material" value="none"/>
     </bsdf></shape>)");
 }
+TEST(Furnace, HardlyRoughAndThinObjectsAreWhite) {
+  expectWhite(
+      R"(<shape type="sphere"><transform name="to_world"><translate x="-1.2"/></transform><bsdf type="roughdielectric">
+    <float name="alpha" value="0.001"/></bsdf></shape><shape type="sphere"><point name="center" x="1.2" y="0" z="0"/>
+    <bsdf type="roughconductor"><float name="alpha" value="0.001"/></bsdf></shape>
+    <shape type="cylinder"><float name="radius" value="0.4"/><bsdf type="thindielectric"/></shape>)");
+}
+// A furnace shows what single scattering off rough facets loses, and that it never gains.
+TEST(Furnace, RoughObjectsAreAtMostWhite) {
+  for (const char* bsdf : {"roughconductor", "roughdielectric"})
+    for (const char* distribution : {"beckmann", "ggx"}) {
+      const stats::Moments m = furnace(std::string(R"(<shape type="sphere"><bsdf type=")") + bsdf +
+                                       R"("><float name="alpha" value="0.5"/><string name="distribution" value=")" +
+                                       distribution + R"("/></bsdf></shape>)");
+      EXPECT_LT(m.mean(), 1 - 4 * m.standardError()) << bsdf << " " << distribution;
+      EXPECT_GT(m.mean(), 0.9) << bsdf << " " << distribution;
+    }
+}
 TEST(Furnace, ObjectsInMediumAreWhite) {
   expectWhite(cloud("1") + R"(<shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse">
     <rgb name="reflectance" value="1"/></bsdf></shape><shape type="sphere"><float name="radius" value="0.3"/>

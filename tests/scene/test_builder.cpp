@@ -45,12 +45,13 @@ void expectError(const std::string& marked, const std::string& message, const st
 }
 
 TEST(Builder, EveryPluginHasDefaults) {
-  for (const char* shape : {"cube", "sphere", "rectangle", "disk"}) {
+  for (const char* shape : {"cube", "sphere", "rectangle", "disk", "cylinder"}) {
     const SceneSnapshot scene = test::build(fmt::format("<shape type=\"{}\"/>", shape));
     EXPECT_EQ(scene->view.surfaces.size, 1) << shape;
     EXPECT_EQ(scene->view.bsdfs[scene->view.surfaces[0].bsdf].front.kind(), Bsdf::Kind::diffuse);
   }
-  for (const char* bsdf : {"diffuse", "phong", "conductor", "dielectric"}) {
+  for (const char* bsdf :
+       {"diffuse", "phong", "conductor", "dielectric", "thindielectric", "roughconductor", "roughdielectric"}) {
     const SceneSnapshot scene = test::build(fmt::format("<shape type=\"sphere\"><bsdf type=\"{}\"/></shape>", bsdf));
     EXPECT_EQ(scene->view.surfaces.size, 1) << bsdf;
   }
@@ -84,7 +85,7 @@ TEST(Builder, UnknownPluginsAreNamedWithWhatIsThere) {
   expectError(boundary("<medium name=\"interior\" type=\"[[homogenous]]\"/>"), "unknown medium type \"homogenous\"",
               "did you mean \"homogeneous\"?", "available: heterogeneous, homogeneous");
   expectError("<shape type=\"[[spere]]\"/>", "unknown shape type \"spere\"", "did you mean \"sphere\"?",
-              "available: cube, disk, obj, ply, rectangle, sphere");
+              "available: cube, cylinder, disk, obj, ply, rectangle, sphere");
   expectError("<emitter type=\"[[spott]]\"/>", "unknown emitter type \"spott\"", "did you mean \"spot\"?");
   expectError("<shape type=\"cube\"><bsdf type=\"[[defuse]]\"/></shape>", "unknown bsdf type \"defuse\"",
               "did you mean \"diffuse\"?");
@@ -96,20 +97,20 @@ TEST(Builder, UnknownPluginsAreNamedWithWhatIsThere) {
 }
 
 TEST(Builder, PluginsOfTheFutureAreNotUnknown) {
-  expectError("<shape type=\"[[cylinder]]\"/>", "shape type \"cylinder\" is not supported yet", "",
-              "available: cube, disk, obj, ply, rectangle, sphere");
+  expectError("<shape type=\"[[gltf]]\"/>", "shape type \"gltf\" is not supported yet", "",
+              "available: cube, cylinder, disk, obj, ply, rectangle, sphere");
   expectError("<sensor type=\"[[thinlens]]\"/>", "sensor type \"thinlens\" is not supported yet");
   expectError("<emitter type=\"[[projector]]\"/>", "emitter type \"projector\" is not supported yet");
-  expectError("<shape type=\"cube\"><bsdf type=\"[[roughconductor]]\"/></shape>",
-              "bsdf type \"roughconductor\" is not supported yet");
+  expectError("<shape type=\"cube\"><bsdf type=\"[[roughplastic]]\"/></shape>",
+              "bsdf type \"roughplastic\" is not supported yet");
   expectError(
       "<sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\"><rfilter "
       "type=\"[[lanczos]]\"/>"
       "</film></sensor>",
       "rfilter type \"lanczos\" is not supported yet");
   expectError(
-      "<shape type=\"cube\"><bsdf type=\"diffuse\"><[[texture]] name=\"reflectance\" type=\"bitmap\"/></bsdf></shape>",
-      "textures (\"bitmap\") are not supported yet", "give an rgb value");
+      "<shape type=\"cube\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"[[volume]]\"/></bsdf></shape>",
+      "texture type \"volume\" is not supported yet", "", "available: bitmap, checkerboard");
 }
 
 TEST(Builder, UnknownParametersAreNamedWithWhatIsThere) {
@@ -189,7 +190,7 @@ TEST(Builder, Transforms) {
   const auto placed = [](const std::string& shape, const std::string& t) {
     return fmt::format("<shape type=\"{}\">{}</shape>", shape, t);
   };
-  for (const char* shape : {"cube", "sphere", "rectangle", "disk"}) {
+  for (const char* shape : {"cube", "sphere", "rectangle", "disk", "cylinder"}) {
     const SceneDescription d = test::describe(
         placed(shape, "<transform name=\"to_world\"><scale x=\"1\" y=\"0\" z=\"1\"/></transform>") + test::kSensor);
     const auto error = loading::errorOf([&] { buildScene(d); });

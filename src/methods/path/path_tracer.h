@@ -141,7 +141,7 @@ class PathTracer {
              environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
   }
 
-  VIRGA_HD void addAreaLight(Path& path, const SurfacePoint& point) const {
+  VIRGA_HD void addAreaLight(Path& path, const SurfacePoint& point, const RayHit& hit) const {
     const ShapeView& shape = scene_.surfaces[point.shape];
     const EmitterView& emitter = scene_.emitters[shape.emitter];
     if (dot(point.geometricNormal, path.at.ray.d) >= 0) return;
@@ -159,7 +159,7 @@ class PathTracer {
         w = weight(last.pdf, connection);
       }
     }
-    path.add(path.layers, emitter.value * w);
+    path.add(path.layers, emitter.radianceAt(lightUv(shape, emitter, point.p, hit.primitive, {hit.u, hit.v})) * w);
   }
 
   // --- next-event estimation ---
@@ -262,7 +262,8 @@ class PathTracer {
     if (isBlack(value)) return;
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
-    const float seen = visibility(leaveSurface(point, c.light.wi, media), point.p, c.light, sampler);
+    const MediaRay leaving = leaveSurface(point, -path.at.ray.d, c.light.wi, media);
+    const float seen = visibility(leaving, point.p, c.light, sampler);
     if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
   }
 
@@ -290,22 +291,41 @@ class PathTracer {
     return survives(path, sampler);
   }
 
-  VIRGA_HD Side sideOf(const SurfacePoint& point, Vec3 wo) const {
-    const SurfaceBsdf& surface = scene_.bsdfs[scene_.surfaces[point.shape].bsdf];
+  /// `textured` holds the bsdf, where textures say what its colours are here.
+  VIRGA_HD Side sideOf(const SurfacePoint& point, const RayHit& hit, Vec3 wo, Bsdf& textured) const {
+    const ShapeView& shape = scene_.surfaces[point.shape];
+    const SurfaceBsdf& surface = scene_.bsdfs[shape.bsdf];
     const bool back = surface.twoSided && dot(wo, point.geometricNormal) < 0;
     const Vec3 n = back ? -point.shadingNormal : point.shadingNormal;
-    const Frame frame(n);
-    return {back ? &surface.back : &surface.front, frame, frame.toLocal(wo),
-            back ? -point.geometricNormal : point.geometricNormal};
+    Frame frame(n);
+    const Bsdf* bsdf = back ? &surface.back : &surface.front;
+    if (surface.anisotropic) frame = Frame(n, surfaceTangent(shape, point.p, hit.primitive));
+    if (surface.textured) {
+      const Vec2 uv = surfaceUv(shape, point.p, hit.primitive, {hit.u, hit.v});
+      textured = bsdfAt(scene_, *bsdf, back ? surface.backTextures : surface.frontTextures, uv);
+      bsdf = &textured;
+    }
+    return {bsdf, frame, frame.toLocal(wo), back ? -point.geometricNormal : point.geometricNormal};
+  }
+
+  /// The ray toward wi off a surface that was reached from wo: if it passes, the media of the other side are around it.
+  VIRGA_HD MediaRay leaveSurface(const SurfacePoint& point, Vec3 wo, Vec3 wi, const MediaState& media) const {
+    MediaRay leaving = virga::leaveSurface(point, wi, media);
+    const MediumTransition& transition = scene_.surfaces[point.shape].media;
+    const float side = dot(wi, point.geometricNormal);
+    if (transition.replaces && side * dot(wo, point.geometricNormal) < 0)
+      leaving.media.pass(transition, side < 0 ? Passing::inward : Passing::outward);
+    return leaving;
   }
 
   VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {
     const ShapeView& shape = scene_.surfaces[hit.shape];
     const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
-    if (shape.emitter >= 0) addAreaLight(path, point);
+    if (shape.emitter >= 0) addAreaLight(path, point, hit);
     if (!mayScatter(path)) return false;
     const Vec3 wo = -path.at.ray.d;
-    const Side side = sideOf(point, wo);
+    Bsdf textured;
+    const Side side = sideOf(point, hit, wo, textured);
     if (side.leaks(wo, side.wo)) return false;
     const bool specular = side.bsdf->specular();
     if (specular) {
@@ -322,10 +342,7 @@ class PathTracer {
     path.throughput *= s.weight;
     path.etaScale *= s.eta * s.eta;
     path.last = {point.p, s.pdf, !specular, 0, {}};
-    path.at = leaveSurface(point, wi, media);
-    const bool passes = dot(wi, point.geometricNormal) * dot(wo, point.geometricNormal) < 0;
-    if (passes && shape.media.replaces)
-      path.at.media.pass(shape.media, dot(wi, point.geometricNormal) < 0 ? Passing::inward : Passing::outward);
+    path.at = leaveSurface(point, wo, wi, media);
     path.tMax = kInfinity;
     ++path.depth;
     return survives(path, sampler);
