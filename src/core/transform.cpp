@@ -70,9 +70,10 @@ bool Matrix4::isFinite() const {
 bool Matrix4::isAffine() const { return m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1; }
 
 bool Matrix4::isSingular() const {
-  double longest = 0;
-  for (int j = 0; j < 3; ++j) longest = std::max(longest, norm({(*this)(0, j), (*this)(1, j), (*this)(2, j)}));
-  return !(std::fabs(determinant3()) > 1e-12 * longest * longest * longest);
+  // Each column by its own length: a long thin box is no flat one.
+  double volume = 1;
+  for (int j = 0; j < 3; ++j) volume *= norm({(*this)(0, j), (*this)(1, j), (*this)(2, j)});
+  return !(std::fabs(determinant3()) > 1e-12 * volume);
 }
 
 Matrix4 Matrix4::inverse() const {

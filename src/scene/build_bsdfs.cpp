@@ -56,8 +56,12 @@ bool isText(const Node& node, std::string_view name) {
   return false;
 }
 
+// Far beyond all that there is; the squares of their ratios stay finite.
+constexpr PluginReader::Range kIndexRange{.lo = 1e-3, .hi = 1e3};
+constexpr PluginReader::Range kComplexIndexRange{.lo = 0, .hi = 1e6};
+
 float refractiveIndex(PluginReader& reader, std::string_view name, std::string_view fallback) {
-  if (reader.has(name) && !isText(reader.node(), name)) return reader.number(name, 1, reader.positive());
+  if (reader.has(name) && !isText(reader.node(), name)) return reader.number(name, 1, kIndexRange);
   return kIndices[reader.oneOf(name, fallback, names(kIndices))].ior;
 }
 
@@ -65,7 +69,9 @@ Bsdf buildDiffuse(PluginReader& reader) { return Bsdf(Diffuse{reader.color("refl
 
 Bsdf buildPhong(PluginReader& reader) {
   const Rgb diffuse = reader.color("diffuse_reflectance", Rgb(0.5f), reader.unit());
-  const Rgb specular = reader.color("specular_reflectance", Rgb(0.2f), reader.unit());
+  const Rgb left = Rgb(1.f) - diffuse;  // the default takes no more than the diffuse part leaves
+  const Rgb usual(std::min(0.2f, left.r), std::min(0.2f, left.g), std::min(0.2f, left.b));
+  const Rgb specular = reader.color("specular_reflectance", usual, reader.unit());
   if (maxComponent(diffuse + specular) > 1)
     reader.fail("specular_reflectance", "diffuse and specular reflectance add up to more than 1");
   return Bsdf(Phong{diffuse, specular, reader.number("exponent", 30, reader.nonNegative())});
@@ -77,7 +83,8 @@ Bsdf buildConductor(PluginReader& reader) {
   if (byNumbers && reader.has("material"))
     reader.fail("material", "give either \"material\" or \"eta\" and \"k\", not both");
   if (!byNumbers) metal = kMetals[reader.oneOf("material", "Cu", names(kMetals))];
-  const Rgb eta = reader.color("eta", metal.eta), k = reader.color("k", metal.k);
+  const Rgb eta = reader.color("eta", metal.eta, kComplexIndexRange),
+            k = reader.color("k", metal.k, kComplexIndexRange);
   const float outside = refractiveIndex(reader, "ext_eta", "air");
   return Bsdf(Conductor{eta / outside, k / outside, reader.color("specular_reflectance", Rgb(1.f), reader.unit())});
 }
