@@ -33,10 +33,13 @@ void printGrid(const GridInfo& g) {
 }
 
 std::string meanText(const Image& image) {
-  double sum[3] = {0, 0, 0};
-  for (const Rgb& p : image.pixels)
+  double sum[3] = {0, 0, 0}, n = 0;
+  for (const Rgb& p : image.pixels) {
+    if (!isFinite(p)) continue;
     for (int c = 0; c < 3; ++c) sum[c] += static_cast<double>(p[c]);
-  const double n = static_cast<double>(image.pixels.size());
+    ++n;
+  }
+  if (n == 0) return "no finite pixel";
   return fmt::format("mean {:.6g} {:.6g} {:.6g}", sum[0] / n, sum[1] / n, sum[2] / n);
 }
 

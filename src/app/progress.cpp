@@ -41,7 +41,8 @@ std::string progressText(const StopRules& rules, const RenderState& state) {
   std::string text = rules.passes ? fmt::format("{}/{} passes", state.passes, *rules.passes)
                                   : fmt::format("{} pass{}", state.passes, state.passes == 1 ? "" : "es");
   text += ", " + durationText(state.seconds);
-  if (const auto error = relMseNow(state)) text += fmt::format(", error {:.1e}", *error);
+  if (const auto error = relMseNow(state))
+    text += fmt::format(", error {:.1e}{}", *error, state.hasNonFinite ? " of the finite pixels" : "");
   if (const auto left = secondsLeft(rules, state)) text += fmt::format(", {} left", durationText(*left));
   return text;
 }

@@ -38,6 +38,11 @@ TEST(Progress, AnOldEstimateIsBroughtToTheNewPasses) {
   EXPECT_FALSE(relMseNow({.passes = 15}));
 }
 
+TEST(Progress, AnErrorOfSomePixelsIsNotThatOfThePicture) {
+  EXPECT_EQ(progressText({}, {.passes = 8, .seconds = 4, .relMse = 0, .relMsePasses = 8, .hasNonFinite = true}),
+            "8 passes, 4.0 s, error 0.0e+00 of the finite pixels");
+}
+
 TEST(Progress, Bar) {
   EXPECT_EQ(barText(0, 4), "[----]");
   EXPECT_EQ(barText(0.5, 4), "[##--]");

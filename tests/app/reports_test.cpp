@@ -139,6 +139,8 @@ TEST_F(Reports, ComparingSaysWhatWasLeftOut) {
   const Ended nothing = run({"compare", "none.exr", "half.exr"});
   EXPECT_EQ(nothing.exitCode, 1);
   EXPECT_TRUE(contains(nothing.err, "no pixel that is finite in both")) << nothing.err;
+  EXPECT_TRUE(contains(run({"info", "half.exr"}).out, "mean 0 0 0\n1 pixels are NaN or infinite"));
+  EXPECT_TRUE(contains(run({"info", "none.exr"}).out, "no finite pixel"));
 }
 
 // ---- names of files -------------------------------------------------------------------------------------------------
