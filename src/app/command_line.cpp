@@ -114,7 +114,8 @@ Action addRender(CLI::App& app) {
               "FILE");
   addStopRules(app, o->stop);
   addParsed(
-      app, "--size", [o](const std::string& t) { o->size = imageSize(t); }, "Size in place of the scene's", "WxH");
+      app, "--size", [o](const std::string& t) { o->size = imageSize(t); },
+      "Size of the film in place of the scene's; a crop window scales with it", "WxH");
   addParsed(
       app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint64_t>("--seed", t, 0, UINT64_MAX); },
       "Seed of all randomness", "N");
@@ -143,7 +144,7 @@ Action addCompare(CLI::App& app) {
 
 Action addInfo(CLI::App& app) {
   auto o = std::make_shared<SceneOptions>();
-  addSceneOptions(app, *o, "FILE", "Scene (.xml), volume (.vdb, .nvdb, .vol) or picture");
+  addSceneOptions(app, *o, "FILE", "Scene (.xml), volume (.vdb, .nvdb, .vol), mesh (.obj, .ply) or picture");
   return [o] { return info(*o); };
 }
 
@@ -185,7 +186,7 @@ struct CommandRow {
 constexpr CommandRow kCommands[] = {
     {"render", "Render a scene or a bare volume", addRender},
     {"compare", "Tell how far a picture is from a reference", addCompare},
-    {"info", "Tell what is in a scene, a volume or a picture", addInfo},
+    {"info", "Tell what is in a scene, a volume, a mesh or a picture", addInfo},
     {"make", "Make a procedural volume, and a scene around it", addMake},
     {"methods", "List the rendering methods, or tell about one", addMethods},
 };

@@ -86,19 +86,20 @@ std::string jsonText(const Metrics& m, const std::optional<Agreement>& t) {
   return json.dump(2);
 }
 
-void printMetrics(const Metrics& m) {
+void printMetrics(const Metrics& m, int64_t pixels) {
+  if (m.pixels < pixels)
+    fmt::print("only {} of {} pixels compared: {} of the image and {} of the reference are NaN or infinite\n", m.pixels,
+               pixels, m.nonFinite, m.referenceNonFinite);
   fmt::print("MSE     {:.6g}\n", m.mse);
   fmt::print("relMSE  {:.6g}\n", m.relMse);
   fmt::print("MAPE    {:.4g} %\n", 100 * m.mape);
   fmt::print("PSNR    {:.4g} dB\n", m.psnr);
   fmt::print("bias    {:+.4g} %  (mean signed relative difference)\n", 100 * m.bias);
   fmt::print("max     {:.6g}\n", m.maxAbs);
-  if (m.nonFinite + m.referenceNonFinite > 0)
-    fmt::print("left out: {} pixels of the image and {} of the reference are NaN or infinite\n", m.nonFinite,
-               m.referenceNonFinite);
 }
 
 void printAgreement(const Agreement& t) {
+  if (t.tests == 0) return fmt::print("t-test  no value has a variance to test by\n");
   fmt::print("t-test  {} values: {:.2f} % beyond 2 (expected {:.2f} %), {:.3f} % beyond 3 (expected {:.3f} %)\n",
              t.tests, 100 * t.beyond2, 100 * t.expectedBeyond2, 100 * t.beyond3, 100 * t.expectedBeyond3);
   fmt::print(
@@ -112,6 +113,7 @@ void printAgreement(const Agreement& t) {
 int compare(const CompareOptions& options) {
   if (!options.difference.empty()) {
     if (outputFormat(options.difference) != OutputFormat::png) throw UsageError("--diff writes a .png");
+    checkNotInput(options.difference, {options.image, options.reference});
     checkWritable(options.difference);
   }
   const Plane image = readPlane(options.image, options.layer), reference = readPlane(options.reference, options.layer);
@@ -121,7 +123,7 @@ int compare(const CompareOptions& options) {
   if (options.json) {
     fmt::print("{}\n", jsonText(metrics, agreement));
   } else {
-    printMetrics(metrics);
+    printMetrics(metrics, static_cast<int64_t>(image.image.pixels.size()));
     if (agreement) printAgreement(*agreement);
   }
   return 0;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "app/options.h"
+#include "scene/mesh.h"
 
 namespace virga::app {
 
@@ -12,5 +13,6 @@ namespace virga::app {
 void printScene(const SceneOptions&);
 void printVolume(const std::string& file);
 void printPicture(const std::string& file);
+void printMesh(const std::string& file, MeshFormat);
 
 }  // namespace virga::app

@@ -9,6 +9,7 @@
 #include "app/usage_error.h"
 #include "core/atomic_write.h"
 #include "core/error.h"
+#include "core/extension.h"
 #include "volume/procedural.h"
 #include "volume/volume_io.h"
 
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 using Writer = void (*)(const fs::path&, const DenseVolume&);
 
 Writer writerFor(const fs::path& file) {
-  const std::string extension = file.extension().string();
+  const std::string extension = lowerCaseExtension(file);
   if (extension == ".vol") return writeVol;
   if (extension == ".vdb") return writeVdb;
   if (extension == ".nvdb") return writeNvdb;
@@ -35,11 +36,11 @@ struct Plan {
 
 Plan planFor(const MakeOptions& options) {
   Plan plan{options.output, options.scene};
-  if (plan.volume.extension() == ".xml") {
+  if (lowerCaseExtension(plan.volume) == ".xml") {
     if (!options.scene.empty()) throw UsageError("--scene and an output that is a scene itself exclude each other");
     plan = {fs::path(options.output).replace_extension(".vol"), options.output};
   }
-  if (!plan.scene.empty() && plan.scene.extension() != ".xml")
+  if (!plan.scene.empty() && lowerCaseExtension(plan.scene) != ".xml")
     throw UsageError(fmt::format("--scene {}: scenes are written as .xml", options.scene));
   return plan;
 }
@@ -56,10 +57,24 @@ void requireOwnVolume(const MakeOptions& options, const Plan& plan, const fs::pa
               {.position = {}, .hint = "name both: -o VOLUME --scene SCENE.xml", .notes = {}});
 }
 
-void writeScene(const Plan& plan, std::vector<std::string> frames, bool isSequence) {
+// What one sees through: smoke and cloud have a surface, fog and dust veil what is behind them.
+double thicknessOf(ProceduralKind kind) {
+  switch (kind) {
+    case ProceduralKind::smoke:
+    case ProceduralKind::cloud:
+      return 10;
+    case ProceduralKind::fog:
+      return 1.5;
+    case ProceduralKind::dust:
+      return 1;
+  }
+  return 1;
+}
+
+void writeScene(const Plan& plan, ReadyScene scene) {
   const fs::path folder = plan.scene.has_parent_path() ? plan.scene.parent_path() : fs::path(".");
   const fs::path relative = fs::proximate(plan.volume, folder);
-  const ReadyScene scene{.frames = std::move(frames), .nameInScene = relative, .isSequence = isSequence};
+  scene.nameInScene = relative;
   writeAtomically(plan.scene, readySceneXml(scene));
   fmt::print(stderr, "wrote {}\n", plan.scene.string());
 }
@@ -83,7 +98,10 @@ int make(const MakeOptions& options) {
     write(files.back(), makeProcedural(kind, settings));
     fmt::print(stderr, "wrote {}\n", files.back());
   }
-  if (!plan.scene.empty()) writeScene(plan, std::move(files), isSequence);
+  if (!plan.scene.empty())
+    writeScene(
+        plan,
+        {.frames = std::move(files), .nameInScene = {}, .thickness = thicknessOf(kind), .isSequence = isSequence});
   return 0;
 }
 

@@ -19,8 +19,11 @@ constexpr double kLongestPause = 60;  // [s] between two plain lines
 }  // namespace
 
 std::string durationText(double seconds) {
+  constexpr double kDay = 86400;
+  if (seconds >= 3652.5 * kDay) return "more than 10 years";
+  if (seconds >= 2 * kDay) return fmt::format("{:.0f} days", seconds / kDay);
   if (seconds < 9.95) return fmt::format("{:.{}f} s", seconds, seconds < 0.995 ? 2 : 1);
-  const int64_t whole = std::llround(std::min(seconds, 1e12));
+  const int64_t whole = std::llround(seconds);
   if (whole < 60) return fmt::format("{} s", whole);
   if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
@@ -38,7 +41,8 @@ std::string progressText(const StopRules& rules, const RenderState& state) {
   std::string text = rules.passes ? fmt::format("{}/{} passes", state.passes, *rules.passes)
                                   : fmt::format("{} pass{}", state.passes, state.passes == 1 ? "" : "es");
   text += ", " + durationText(state.seconds);
-  if (state.relMse) text += fmt::format(", error {:.1e}", *state.relMse);
+  if (const auto error = relMseNow(state))
+    text += fmt::format(", error {:.1e}{}", *error, state.hasNonFinite ? " of the finite pixels" : "");
   if (const auto left = secondsLeft(rules, state)) text += fmt::format(", {} left", durationText(*left));
   return text;
 }

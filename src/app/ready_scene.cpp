@@ -25,7 +25,7 @@ std::string withFrameVariable(std::string xml) {
 }  // namespace
 
 std::string readySceneXml(const ReadyScene& scene) {
-  SceneDescription around = sceneAroundVolume(scene.frames);
+  SceneDescription around = sceneAroundVolume(scene.frames, scene.thickness);
   around.searchPaths.clear();  // a scene finds what lies beside it, wherever both are moved
   const std::string xml = toXml(edited(around, "density", "filename", sceneName(scene)));
   return scene.isSequence ? withFrameVariable(xml) : xml;

@@ -12,6 +12,7 @@ struct ReadyScene {
   std::vector<std::string> frames;  ///< the volume's file, or those of a sequence: all of them must fit the picture
   /// As the scene is to name it: relative to the scene's folder, without the number.
   std::filesystem::path nameInScene;
+  double thickness = 10;    ///< optical, across the volume
   bool isSequence = false;  ///< then the scene has a variable: -D frame=0012
 };
 

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <utility>
@@ -64,6 +65,15 @@ void requireMemory(const Scene& scene, LayerMask layers) {
               {.position = {}, .hint = "choose a smaller --size", .notes = {}});
 }
 
+// " of 64 passes" where that was the aim, else " passes".
+std::string intendedText(const StopRules& rules) {
+  return rules.passes ? fmt::format(" of {} passes", *rules.passes) : std::string(" passes");
+}
+
+bool isBlack(const Image& image) {
+  return std::all_of(image.pixels.begin(), image.pixels.end(), [](const Rgb& p) { return p == Rgb(0.f); });
+}
+
 class RenderJob {
  public:
   RenderJob(const RenderOptions& options, Interrupt& interrupt, int threads)
@@ -75,6 +85,7 @@ class RenderJob {
 
   void run() {
     checkNames(report_.outputs, options_.stats);
+    requireInputsSafe({options_.scene.file});
     requireErrorEstimate(options_, method_);
     const Settings settings = methodSettings(method_, options_.settings, options_.seed);
     checkAllWritable(report_.outputs, options_.stats);
@@ -92,12 +103,18 @@ class RenderJob {
   SceneSnapshot loadAndBuild() {
     const SceneDescription description =
         timed(report_.timings.load, [&] { return loadScene(options_.scene, report_.warnings); });
+    requireInputsSafe(filesOf(description));
     SceneSnapshot scene = timed(report_.timings.build, [&] {
       return buildScene(description, {.filmSize = options_.size, .lenient = options_.scene.lenient});
     });
     report_.warnings.insert(report_.warnings.end(), scene->warnings.begin(), scene->warnings.end());
     for (const std::string& warning : report_.warnings) say("{}\n", warning);
     return scene;
+  }
+
+  void requireInputsSafe(const std::vector<std::filesystem::path>& inputs) const {
+    for (const std::string& output : report_.outputs) checkNotInput(output, inputs);
+    checkNotInput(options_.stats, inputs);
   }
 
   void renderPasses(RenderSession& session) {
@@ -111,11 +128,12 @@ class RenderJob {
     report_.timings.renderCpu = cpuSeconds() - cpuBefore;
     progress.finish(report_.outcome.state);
     if (report_.outcome.reason == StopReason::interrupted)
-      say("interrupted: the picture holds {} of the passes\n", session.film().passes());
+      say("interrupted: the picture holds {}{}\n", session.film().passes(), intendedText(rules));
   }
 
   void write(const RenderSession& session) {
     warnOfNonFinite(session.film());
+    warnOfBlack(session.film());
     const auto shield = interrupt_.shield();
     const Stopwatch watch;
     writePictures(report_.outputs, developed(session, report_.outcome, report_.sceneFile,
@@ -132,6 +150,14 @@ class RenderJob {
     report_.warnings.push_back(
         fmt::format("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
                     film.nonFiniteSamples()));
+    say("warning: {}\n", report_.warnings.back());
+  }
+
+  void warnOfBlack(const Film& film) {
+    if (!isBlack(film.beauty())) return;
+    report_.warnings.push_back(
+        "every pixel is black: look at near_clip and far_clip, where the camera looks, the lights, the density of "
+        "the medium, whether its grid lies inside its shape, and max_depth");
     say("warning: {}\n", report_.warnings.back());
   }
 

@@ -34,6 +34,7 @@ LoopOutcome renderLoop(RenderSession& session, const StopRules& rules, std::stop
     const PassResult pass = session.step({}, state.passes == 0 ? std::stop_token{} : stop);
     state.passes = session.film().passes();
     state.converged = pass.converged;
+    state.hasNonFinite = session.film().nonFiniteSamples() > 0;
     state.interrupted = stop.stop_requested();
     out.biased |= pass.biased;
     if (schedule.due(state.passes)) estimate(session, state);

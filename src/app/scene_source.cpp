@@ -42,17 +42,14 @@ float meanOfNonZero(const std::string& volFile) {
 
 }  // namespace
 
-bool isVolumeFile(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  return extension == ".vdb" || extension == ".nvdb" || extension == ".vol";
-}
+bool isVolumeFile(const std::string& path) { return volumeFormat(path) != VolumeFormat::none; }
 
-SceneDescription sceneAroundVolume(const std::vector<std::string>& frames) {
-  BareVolume all{.file = frames.front()};
+SceneDescription sceneAroundVolume(const std::vector<std::string>& frames, double thickness) {
+  BareVolume all{.file = frames.front(), .thickness = thickness};
   for (const std::string& file : frames) {
     const std::vector<GridInfo> grids = listGrids(file);
     const GridInfo& density = densityOf(file, grids);
-    const bool isVol = std::filesystem::path(file).extension() == ".vol";
+    const bool isVol = volumeFormat(file) == VolumeFormat::vol;
     if (&file == &frames.front() && grids.size() > 1) all.grid = density.name;
     all.worldBounds.extend(density.worldBounds);
     all.maximumDensity = std::max(all.maximumDensity, density.maximum);
@@ -67,7 +64,7 @@ SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>
                           {.defines = options.defines, .lenient = options.lenient, .warnings = &warnings});
   if (!options.defines.empty())
     throw Error(fmt::format("-D has no meaning for \"{}\": a volume has no variables", options.file));
-  return sceneAroundVolume({options.file});
+  return sceneAroundVolume({options.file}, BareVolume{}.thickness);
 }
 
 }  // namespace virga::app

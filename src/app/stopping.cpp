@@ -25,6 +25,11 @@ std::optional<double> passesToError(double limit, const RenderState& state) {
 
 }  // namespace
 
+std::optional<double> relMseNow(const RenderState& state) {
+  if (!state.relMse || state.passes == 0) return state.relMse;
+  return *state.relMse * static_cast<double>(state.relMsePasses) / static_cast<double>(state.passes);
+}
+
 std::string_view stopReasonName(StopReason reason) {
   switch (reason) {
     case StopReason::passes:

@@ -29,7 +29,11 @@ struct RenderState {
   bool interrupted = false;
   std::optional<double> relMse{};  ///< latest estimate
   int64_t relMsePasses = 0;        ///< passes that the estimate is made of
+  bool hasNonFinite = false;       ///< then the estimate is of the other pixels
 };
+
+/// The latest estimate, brought to all passes: the error falls as 1 / passes, and an estimate comes now and then only.
+std::optional<double> relMseNow(const RenderState&);
 
 /// Passes before which an estimated error stops nothing: two in each of the film's 8 replicates.
 inline constexpr int64_t kFewestPassesForError = 16;

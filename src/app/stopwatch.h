@@ -4,6 +4,7 @@
 #include <sys/resource.h>
 
 #include <chrono>
+#include <cstdint>
 
 namespace virga::app {
 
@@ -28,10 +29,10 @@ inline double cpuSeconds() {
 }
 
 /// Most memory that the process ever held [bytes].
-inline double peakResidentBytes() {
+inline int64_t peakResidentBytes() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
-  return 1024.0 * static_cast<double>(usage.ru_maxrss);
+  return int64_t{1024} * usage.ru_maxrss;
 }
 
 }  // namespace virga::app

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core/transform.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "core/error.h"
 
 namespace virga {
@@ -70,9 +74,15 @@ bool Matrix4::isFinite() const {
 bool Matrix4::isAffine() const { return m[12] == 0 && m[13] == 0 && m[14] == 0 && m[15] == 1; }
 
 bool Matrix4::isSingular() const {
-  double longest = 0;
-  for (int j = 0; j < 3; ++j) longest = std::max(longest, norm({(*this)(0, j), (*this)(1, j), (*this)(2, j)}));
-  return !(std::fabs(determinant3()) > 1e-12 * longest * longest * longest);
+  // By the angles between its columns, and by their lengths: a long thin box is no flat one.
+  constexpr double kFlat = 1e-12;
+  double volume = 1, shortest = std::numeric_limits<double>::infinity(), longest = 0;
+  for (int j = 0; j < 3; ++j) {
+    const double column = norm({(*this)(0, j), (*this)(1, j), (*this)(2, j)});
+    volume *= column;
+    shortest = std::min(shortest, column), longest = std::max(longest, column);
+  }
+  return !(std::fabs(determinant3()) > kFlat * volume && shortest > kFlat * longest);
 }
 
 Matrix4 Matrix4::inverse() const {

@@ -6,12 +6,13 @@
 #include <array>
 #include <cmath>
 
+#include "volume/volume_io.h"
+
 namespace virga {
 namespace {
 
 constexpr float kFieldOfView = 35;   // [degrees], both ways: the film is square
 constexpr float kFrameFill = 0.92f;  // of the frame's half width
-constexpr double kThickness = 10;    // optical, across the volume
 constexpr float kMinAspect = 1e-3f;  // thinner boxes are padded
 constexpr int64_t kFilmSize = 512;   // [pixels]
 
@@ -84,7 +85,7 @@ NodePtr ground(const Bounds& box) {
 
 NodePtr density(const BareVolume& volume, const Bounds& box) {
   std::vector<Property> properties{{.name = "filename", .value = std::filesystem::absolute(volume.file).string()}};
-  if (volume.file.extension() == ".vol") {
+  if (volumeFormat(volume.file) == VolumeFormat::vol) {
     properties.push_back({.name = "to_world", .value = translation(box.lo) * scaling(box.extent())});
     return node("volume", "gridvolume", "density", std::move(properties));
   }
@@ -98,7 +99,7 @@ NodePtr medium(const BareVolume& volume, const Bounds& box) {
   const double across = (double{extent.x} + extent.y + extent.z) / 3;
   return node("medium", "heterogeneous", "medium",
               {child(density(volume, box), "sigma_t"),
-               {.name = "scale", .value = kThickness / (typical * across)},
+               {.name = "scale", .value = volume.thickness / (typical * across)},
                {.name = "albedo", .value = Rgb(0.95f)},
                child(node("phase", "isotropic", "phase", {}))});
 }

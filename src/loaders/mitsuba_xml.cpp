@@ -70,11 +70,15 @@ class Loader {
     readChildren(scene, root, context, 1);
     NodePtr resolved = drafts_.resolve(scene);
     variables_.requireAllUsed();
-    return {std::move(resolved), searchPaths()};
+    for (const Error& unused : variables_.unusedDefaults()) complaints_.warn(unused);
+    return {std::move(resolved), searchPaths(), sources_};
   }
 
   /// The file that includes must be refused where one of its includes names it again.
-  void enter(const fs::path& file) { openFiles_.push_back(identity(file)); }
+  void enter(const fs::path& file) {
+    openFiles_.push_back(identity(file));
+    sources_.push_back(openFiles_.back());
+  }
 
  private:
   struct FileContext {
@@ -310,6 +314,7 @@ class Loader {
   std::vector<fs::path> paths_;  // from <path>, the latest first
   std::vector<fs::path> includeDirectories_;
   std::vector<fs::path> openFiles_;
+  std::vector<fs::path> sources_;  // all that were ever open
   size_t includes_ = 0;
 };
 

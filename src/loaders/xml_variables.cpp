@@ -34,13 +34,13 @@ std::string_view word(std::string_view text) {
 }  // namespace
 
 Variables::Variables(const std::map<std::string, std::string>& defines) {
-  for (const auto& [name, value] : defines) variables_[name] = {value, "given on the command line", true};
+  for (const auto& [name, value] : defines) variables_[name] = {value, "given on the command line", {}, true};
 }
 
 void Variables::addDefault(const std::string& name, const std::string& value, const SourcePosition& position) {
   if (std::find(defaults_.begin(), defaults_.end(), name) == defaults_.end()) defaults_.push_back(name);
-  variables_.try_emplace(name,
-                         Variable{value, fmt::format("the default of {}:{}", position.file->name, position.line())});
+  variables_.try_emplace(
+      name, Variable{value, fmt::format("the default of {}:{}", position.file->name, position.line()), position});
 }
 
 std::string Variables::longestName(std::string_view text) const {
@@ -85,16 +85,31 @@ Argument Variables::substituted(const xml::Attribute& attribute) {
   return out;
 }
 
+std::vector<std::string> Variables::namesInScene() const {
+  std::vector<std::string> names = defaults_;
+  for (const auto& [name, variable] : variables_)
+    if (variable.used && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  return names;
+}
+
 void Variables::requireAllUsed() const {
   for (const auto& [name, variable] : variables_) {
     if (!variable.isDefine || variable.used) continue;
-    const bool isDefault = std::find(defaults_.begin(), defaults_.end(), name) != defaults_.end();
-    throw Error(
-        fmt::format("-D {}={} changes nothing: the scene never uses ${}", name, variable.value, name),
-        {.position = {},
-         .hint = isDefault ? "" : didYouMean(name, defaults_),
-         .notes = {defaults_.empty() ? "the scene has no variables" : "the scene's variables: " + joined(defaults_)}});
+    const std::vector<std::string> known = namesInScene();
+    const bool isDefault = std::find(known.begin(), known.end(), name) != known.end();
+    throw Error(fmt::format("-D {}={} changes nothing: the scene never uses ${}", name, variable.value, name),
+                {.position = {},
+                 .hint = isDefault ? "" : didYouMean(name, known),
+                 .notes = {known.empty() ? "the scene has no variables" : "the scene's variables: " + joined(known)}});
   }
+}
+
+std::vector<Error> Variables::unusedDefaults() const {
+  std::vector<Error> errors;
+  for (const auto& [name, variable] : variables_)
+    if (!variable.used && !variable.isDefine)
+      errors.push_back(errorAt(variable.position, fmt::format("the default of ${} is never used", name)));
+  return errors;
 }
 
 }  // namespace virga

@@ -24,10 +24,14 @@ class Variables {
   /// Throws Error for a value from the command line that no attribute used: it would change nothing.
   void requireAllUsed() const;
 
+  /// The defaults that no attribute used: each as an error that may be shown as a warning.
+  std::vector<Error> unusedDefaults() const;
+
  private:
   struct Variable {
     std::string value;
-    std::string origin;  // for a note
+    std::string origin;         // for a note
+    SourcePosition position{};  // of the default, where the value is that
     bool isDefine = false;
     bool used = false;
   };
@@ -36,6 +40,7 @@ class Variables {
   [[noreturn]] void failUnknown(const SourcePosition& position, std::string_view text) const;
 
   std::map<std::string, Variable> variables_;
+  std::vector<std::string> namesInScene() const;
   std::vector<std::string> defaults_;
 };
 

@@ -55,8 +55,12 @@ bool isText(const Node& node, std::string_view name) {
   return false;
 }
 
+// Far beyond all that there is; the squares of their ratios stay finite.
+constexpr PluginReader::Range kIndexRange{.lo = 1e-3, .hi = 1e3};
+constexpr PluginReader::Range kComplexIndexRange{.lo = 0, .hi = 1e6};
+
 float refractiveIndex(PluginReader& reader, std::string_view name, std::string_view fallback) {
-  if (reader.has(name) && !isText(reader.node(), name)) return reader.number(name, 1, reader.positive());
+  if (reader.has(name) && !isText(reader.node(), name)) return reader.number(name, 1, kIndexRange);
   return kIndices[reader.oneOf(name, fallback, names(kIndices))].ior;
 }
 
@@ -91,7 +95,10 @@ class BsdfReader {
 Bsdf buildDiffuse(BsdfReader& in) { return Bsdf(Diffuse{in.color("reflectance", 0.5f)}); }
 
 Bsdf buildPhong(BsdfReader& in) {
-  const Rgb diffuse = in.color("diffuse_reflectance", 0.5f), specular = in.color("specular_reflectance", 0.2f);
+  const Rgb diffuse = in.color("diffuse_reflectance", 0.5f);
+  const Rgb left = Rgb(1.f) - diffuse;  // the default takes no more than the diffuse part leaves
+  const Rgb usual(std::min(0.2f, left.r), std::min(0.2f, left.g), std::min(0.2f, left.b));
+  const Rgb specular = in.scaled("specular_reflectance", usual, PluginReader::unit(), 1);
   if (maxComponent(diffuse + specular) > 1)
     in.reader.fail("specular_reflectance", "diffuse and specular reflectance add up to more than 1",
                    in.textures.any() ? "the largest values of textures count, wherever they lie" : "");
@@ -107,8 +114,8 @@ Conductor readConductor(BsdfReader& in) {
     reader.fail("material", "give either \"material\" or \"eta\" and \"k\", not both");
   if (!byNumbers) metal = kMetals[reader.oneOf("material", "none", names(kMetals))];
   const float scale = 1 / refractiveIndex(reader, "ext_eta", "vacuum");
-  const Rgb eta = in.scaled("eta", metal.eta, reader.nonNegative(), scale);
-  const Rgb k = in.scaled("k", metal.k, reader.nonNegative(), scale);
+  const Rgb eta = in.scaled("eta", metal.eta, kComplexIndexRange, scale);
+  const Rgb k = in.scaled("k", metal.k, kComplexIndexRange, scale);
   return {eta, k, in.color("specular_reflectance", 1)};
 }
 

@@ -21,6 +21,8 @@ struct BuildContext {
   Scene::Parts& parts;
   const PartCache* previous = nullptr;
 
+  bool wantsNoMedia = false;  ///< the integrator is one that leaves them out
+
   std::map<const Node*, int> mediumIndex, bsdfIndex;  ///< objects that are referred to several times are built once
 
   /// The file that a plugin's parameter names, found along the search paths. Throws where there is none.
@@ -97,6 +99,11 @@ void buildEmitter(BuildContext&, const Node& emitter);
 void addAreaEmitter(BuildContext&, const Node& emitter, int surface, const BuiltShape&);
 /// Power of every emitter, once the scene's bounds are known [W].
 void chooseEmittersByPower(BuildContext&);
+/// Steps of tracking are of the order of a mean free path: throws where the medium is so many of them thick that they
+/// drown in the rounding of distances.
+void requireTrackable(const SourcePosition& medium, float thickness);
+/// Throws, or warns, where sizes and places are beyond single precision. Once the scene's bounds are known.
+void checkLimits(BuildContext&);
 bool isNullBsdf(const Node& bsdf);
 
 }  // namespace virga

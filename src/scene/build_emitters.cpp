@@ -103,6 +103,8 @@ std::shared_ptr<const BuiltEnvironment> loadEnvironment(const std::filesystem::p
   auto environment = std::make_shared<BuiltEnvironment>();
   environment->image = readImage(path);
   checkRadiance(environment->image);
+  for (const Rgb& pixel : environment->image.pixels)
+    environment->brightest = std::max(environment->brightest, maxComponent(pixel));
   makeTables(*environment);
   return environment;
 }
@@ -132,6 +134,10 @@ EmitterView buildEnvironment(BuildContext& context, PluginReader& reader) {
         reader.fail("to_world", "an environment map's transform must be a rotation");
     }
   e.value = Rgb(built->meanRadiance * view.scale);
+  constexpr float kBrightest = 1e30f;  // sums over directions and paths stay finite
+  if (!(built->brightest * view.scale <= kBrightest))
+    reader.fail("scale", fmt::format("the map reaches {:g}, with its scale {:g}; it must be at most {:g}",
+                                     built->brightest, double{built->brightest} * double{view.scale}, kBrightest));
   reader.ignore("mis_compensation");
   return e;
 }
@@ -180,6 +186,10 @@ void buildEmitter(BuildContext& context, const Node& node) {
 
 void addAreaEmitter(BuildContext& context, const Node& node, int surface, const BuiltShape& shape) {
   static constexpr PluginRow<int> kRows[] = {{"area", 0}};
+  for (const std::string_view alone : {"point", "spot", "directional", "constant", "envmap"})
+    if (node.type == alone)
+      PluginReader(node, context.diagnostics)
+          .failHere(fmt::format("a {} emitter has no place in a shape", node.type), "only area emitters have");
   findPlugin(node, kRows, kNotYet);
   PluginReader reader(node, context.diagnostics);
   EmitterView e;

@@ -42,6 +42,14 @@ VolumeField buildConstantVolume(BuildContext&, PluginReader& reader, VolumeUse) 
   return {reader.color("value", Rgb(1.f)), nullptr, nullptr, {}};
 }
 
+// The two plugins place their grids by different rules, so neither reads what is the other's.
+void refuseFormat(PluginReader& reader, const std::filesystem::path& path, std::initializer_list<VolumeFormat> refused,
+                  std::string_view remedy) {
+  if (std::find(refused.begin(), refused.end(), volumeFormat(path)) != refused.end())
+    reader.fail("filename", fmt::format("a {} does not read this format", reader.node().type),
+                fmt::format("use type=\"{}\"", remedy));
+}
+
 void refuseOtherSampling(PluginReader& reader) {
   static constexpr std::string_view kFilters[] = {"trilinear"}, kWraps[] = {"clamp"};
   reader.oneOf("filter_type", "trilinear", kFilters);
@@ -52,6 +60,7 @@ void refuseOtherSampling(PluginReader& reader) {
 
 VolumeField buildGridVolume(BuildContext& context, PluginReader& reader, VolumeUse use) {
   const std::filesystem::path path = context.file(reader, "filename");
+  refuseFormat(reader, path, {VolumeFormat::vdb, VolumeFormat::nvdb}, "vdb");
   refuseOtherSampling(reader);
   VolumeField field;
   field.indexToWorld = reader.transform("to_world");
@@ -78,6 +87,7 @@ VolumeField buildVdb(BuildContext& context, PluginReader& reader, VolumeUse use)
   if (use == VolumeUse::albedo) reader.failHere("a vdb volume for \"albedo\" is not supported yet", "use a gridvolume");
   const std::filesystem::path path = context.file(reader, "filename");
   const std::string grid = reader.text("grid", "");
+  refuseFormat(reader, path, {VolumeFormat::vol}, "gridvolume");
   VolumeField field;
   field.grid = loadedFrom(reader, reader.has("grid") ? "grid" : "filename", [&] {
     return context.cached<Grid>(&PartCache::grids, fileKey(path) + "#" + grid,
@@ -150,21 +160,14 @@ void readSigmaT(BuildContext& context, PluginReader& reader, MediumView& medium)
   medium.worldToDensity = Affine(field.indexToWorld.inverse());
 }
 
-// Steps of tracking are of the order of a mean free path: beyond this they drown in the rounding of distances.
 void requireTrackable(PluginReader& reader, const MediumView& medium) {
-  constexpr float kMostMeanFreePaths = 1e6f;
   const GridView& g = medium.density;
   float densest = g.background;
   const size_t cells =
       static_cast<size_t>(g.majorant.nx) * static_cast<size_t>(g.majorant.ny) * static_cast<size_t>(g.majorant.nz);
   for (size_t i = 0; i < cells; ++i) densest = std::max(densest, g.majorant.values[i]);
   const float across = length(g.supportHi - g.supportLo) / length(medium.worldToDensity.x);
-  const float thickness = densest * medium.sigmaT * across;
-  if (!(thickness <= kMostMeanFreePaths))
-    reader.fail("scale",
-                fmt::format("the medium is {:.2g} mean free paths thick; at most {:.0e} can be tracked", thickness,
-                            kMostMeanFreePaths),
-                "reduce \"scale\"");
+  requireTrackable(reader.positionOf("scale"), densest * medium.sigmaT * across);
 }
 
 MediumView readMedium(BuildContext& context, PluginReader& reader) {
@@ -181,7 +184,8 @@ MediumView readMedium(BuildContext& context, PluginReader& reader) {
   if (!std::isfinite(medium.sigmaT)) reader.fail("scale", "\"scale\" times \"sigma_t\" is too large");
   if (!medium.homogeneous) requireTrackable(reader, medium);
   readPhase(context, reader, medium);
-  reader.ignore("sample_emitters");
+  if (!reader.boolean("sample_emitters", true))
+    reader.warnIgnored("sample_emitters", "the method decides how it finds light");
   reader.ignore("has_spectral_extinction");
   reader.ignore("majorant_resolution_factor");
   return medium;
@@ -225,6 +229,14 @@ ScalarField buildScalarVolume(BuildContext& context, const Node& volume) {
   ScalarField constant;
   constant.grid.background = constant.maximum = field.constant.r;
   return constant;
+}
+
+void requireTrackable(const SourcePosition& medium, float thickness) {
+  constexpr float kMostMeanFreePaths = 1e6f;
+  if (thickness <= kMostMeanFreePaths) return;
+  throw Error(fmt::format("the medium is {:.2g} mean free paths thick; at most {:.0e} can be tracked", thickness,
+                          kMostMeanFreePaths),
+              {medium, "reduce \"scale\" or \"sigma_t\"", {}});
 }
 
 int buildMedium(BuildContext& context, const Node& node) {

@@ -73,6 +73,30 @@ void readCrop(PluginReader& reader, PerspectiveCamera& camera) {
                 fmt::format("the crop window leaves the film, which is {} pixels high", camera.filmHeight));
 }
 
+// Another size of film shows the same part of it: the crop window grows or shrinks along, to no less than a pixel.
+void resizeFilm(PerspectiveCamera& camera, int width, int height) {
+  const auto scale = [](int& offset, int& size, int& whole, int wanted) {
+    const double factor = static_cast<double>(wanted) / whole;
+    const int end = std::min(wanted, static_cast<int>(std::lround((offset + size) * factor)));
+    offset = std::min(static_cast<int>(std::lround(offset * factor)), wanted - 1);
+    size = std::max(1, end - offset);
+    whole = wanted;
+  };
+  scale(camera.cropX, camera.width, camera.filmWidth, width);
+  scale(camera.cropY, camera.height, camera.filmHeight, height);
+}
+
+// What a file of Mitsuba's would look like; here the output's name and Virga decide.
+void warnOfFormats(PluginReader& reader) {
+  const auto check = [&](std::string_view name, std::initializer_list<std::string_view> fitting, std::string_view why) {
+    const std::string value = reader.text(name, *fitting.begin());
+    if (std::find(fitting.begin(), fitting.end(), value) == fitting.end()) reader.warnIgnored(name, why);
+  };
+  check("file_format", {"openexr", "exr"}, "the name of the output says whether it is an EXR or a PNG");
+  check("pixel_format", {"rgb"}, "pictures are RGB");
+  check("component_format", {"float16", "float32"}, "an EXR holds 32-bit floats");
+}
+
 void buildFilm(BuildContext& context, const Node& node) {
   static constexpr PluginRow<int> kFilms[] = {{"hdrfilm", 0}};
   findPlugin(node, kFilms, kFilmsNotYet);
@@ -81,15 +105,10 @@ void buildFilm(BuildContext& context, const Node& node) {
   camera.filmWidth = pixels(reader, "width", 768);
   camera.filmHeight = pixels(reader, "height", 576);
   readCrop(reader, camera);
-  if (const auto& size = context.options.filmSize) {
-    camera.filmWidth = camera.width = size->first;
-    camera.filmHeight = camera.height = size->second;
-    camera.cropX = camera.cropY = 0;
-  }
+  if (const auto& size = context.options.filmSize) resizeFilm(camera, size->first, size->second);
   context.scene.filter = buildFilter(context, reader.child("rfilter"));
-  for (const char* format : {"file_format", "pixel_format", "component_format", "banner", "high_quality_edges",
-                             "sample_border", "compensate"})
-    reader.ignore(format);
+  warnOfFormats(reader);
+  for (const char* name : {"banner", "high_quality_edges", "sample_border", "compensate"}) reader.ignore(name);
   reader.finish();
 }
 
@@ -150,7 +169,7 @@ void readSampler(BuildContext& context, const Node& node) {
   findPlugin(node, kSamplers, {});  // Virga has one sampler of its own; of the scene's it takes the number of samples
   PluginReader reader(node, context.diagnostics);
   context.scene.integrator.sampleCount = reader.integer("sample_count", 16, {.lo = 1, .hi = 1e9});
-  reader.ignore("seed");
+  if (reader.integer("seed", 0) != 0) reader.warnIgnored("seed", "the seed is that of --seed");
   reader.ignore("jitter");
   reader.finish();
 }
@@ -173,6 +192,7 @@ void buildIntegrator(BuildContext& context, const Node& integrator) {
   PluginReader reader(integrator, context.diagnostics);
   if (const NodePtr nested = reader.child("integrator")) buildIntegrator(context, *nested);
   IntegratorHints& hints = context.scene.integrator;
+  context.wantsNoMedia |= integrator.type == "path";
   hints.maxDepth = reader.integer("max_depth", hints.maxDepth, {.lo = -1});
   hints.rrDepth = reader.integer("rr_depth", hints.rrDepth, {.lo = 1});
   if (reader.boolean("hide_emitters", false)) reader.fail("hide_emitters", "\"hide_emitters\" is not supported yet");

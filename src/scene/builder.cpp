@@ -56,6 +56,12 @@ void warnOfOverlaps(BuildContext& context) {
                     MediaState::kCapacity));
 }
 
+void warnOfMedia(BuildContext& context) {
+  if (context.wantsNoMedia && !context.parts.media.empty())
+    context.diagnostics.warnings.push_back(
+        "warning: integrator \"path\" is ignored: it renders no media, and the method of --method does");
+}
+
 // What makes a picture black, or leaves light out, without being an error.
 void warnOfDarkness(BuildContext& context) {
   const Scene::Parts& parts = context.parts;
@@ -136,7 +142,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   scene->description = description;
   BuildContext context{description, options, {.lenient = options.lenient, .warnings = {}},
                        *scene,      *parts,  previous ? &previous->parts->cache : nullptr,
-                       {},          {}};
+                       false,       {},      {}};
 
   PluginReader reader(*description.root, context.diagnostics);
   if (const NodePtr integrator = onlyChild(reader, "integrator")) buildIntegrator(context, *integrator);
@@ -154,11 +160,13 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
 
   linkShapes(*scene, *parts);
   measureBounds(*scene, *parts);
+  checkLimits(context);
   warnOfOverlaps(context);
   chooseEmittersByPower(context);
   linkViews(*scene, *parts);
   warnOfDarkness(context);
   placeCamera(*scene);
+  warnOfMedia(context);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);
   return scene;

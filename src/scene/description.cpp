@@ -212,12 +212,22 @@ std::optional<std::filesystem::path> findFile(const SceneDescription& scene, con
   return std::nullopt;
 }
 
+std::vector<std::filesystem::path> filesOf(const SceneDescription& scene) {
+  std::vector<std::filesystem::path> files = scene.sources;
+  forEachNode(scene, [&](const NodePtr& node) {
+    for (const Property& p : node->properties)
+      if (const auto* name = std::get_if<std::string>(&p.value); name && p.name == "filename")
+        if (const auto file = findFile(scene, *name)) files.push_back(*file);
+  });
+  return files;
+}
+
 SceneDescription edited(const SceneDescription& scene, std::string_view nodeId, std::string_view property,
                         Value value) {
   const NodePtr target = findNode(scene, nodeId);
   if (!target) throw unknownId(scene, nodeId);
   PathCopy copy(target.get(), withProperty(*target, property, std::move(value)));
-  return {copy(scene.root), scene.searchPaths};
+  return {copy(scene.root), scene.searchPaths, scene.sources};
 }
 
 std::string toXml(const SceneDescription& scene) { return XmlWriter(scene).write(scene); }

@@ -48,6 +48,7 @@ struct Node {
 struct SceneDescription {
   NodePtr root;                                    ///< tag "scene"
   std::vector<std::filesystem::path> searchPaths;  ///< for relative file names, first match wins; absolute paths
+  std::vector<std::filesystem::path> sources{};    ///< the scene's file and those that it includes
 };
 
 /// The node with that id, or null.
@@ -55,6 +56,9 @@ NodePtr findNode(const SceneDescription&, std::string_view id);
 
 /// The file that the description means by `name`: absolute, or along the search paths. Nothing where there is none.
 std::optional<std::filesystem::path> findFile(const SceneDescription&, const std::filesystem::path& name);
+
+/// All files that the description was read from or names: those that must not be written over.
+std::vector<std::filesystem::path> filesOf(const SceneDescription&);
 
 /// A copy in which one parameter of one node has another value (added where it was absent). All nodes that the edit
 /// does not reach are shared with the original. Throws Error for an unknown id.

@@ -26,6 +26,8 @@ bool inRange(double v, const PluginReader::Range& r) {
   return (r.openLo ? v > r.lo : v >= r.lo) && (r.openHi ? v < r.hi : v <= r.hi);
 }
 
+bool isFinite(const Affine& a) { return isFinite(a.x) && isFinite(a.y) && isFinite(a.z) && isFinite(a.translation); }
+
 }  // namespace
 
 void BuildDiagnostics::complain(const Error& error) {
@@ -62,29 +64,31 @@ void PluginReader::fail(std::string_view parameter, std::string message, std::st
   throw Error(std::move(message), {positionOf(parameter), std::move(hint), std::move(notes)});
 }
 
+void PluginReader::warnIgnored(std::string_view parameter, std::string_view why) {
+  diagnostics_.warn(Error(fmt::format("\"{}\" is ignored: {}", parameter, why), {positionOf(parameter), "", {}}));
+}
+
 void PluginReader::failHere(std::string message, std::string hint, std::vector<std::string> notes) {
   const SourcePosition position = node_.typePosition.known() ? node_.typePosition : node_.position;
   throw Error(std::move(message), {position, std::move(hint), std::move(notes)});
 }
 
-double PluginReader::checkedNumber(std::string_view name, double value, const Range& range) {
-  // Values become single precision: what overflows there is as bad as what is not finite.
-  if (!std::isfinite(static_cast<float>(value))) fail(name, fmt::format("\"{}\" is too large", name));
-  if (!inRange(value, range)) {
-    const auto single = static_cast<float>(value);  // prints with the digits that were written
-    const std::string text =
-        static_cast<double>(single) == value ? fmt::format("{}", single) : fmt::format("{}", value);
-    fail(name, fmt::format("\"{}\" is {}; it must be {}", name, text, rangeText(range)));
-  }
-  return value;
+float PluginReader::checkedNumber(std::string_view name, double value, const Range& range) {
+  // The range is that of what is kept: 0.99999999 becomes 1 in single precision, 1e-50 becomes 0.
+  const auto single = static_cast<float>(value);
+  if (!std::isfinite(single)) fail(name, fmt::format("\"{}\" is too large", name));
+  if (inRange(static_cast<double>(single), range)) return single;
+  const std::string text = static_cast<double>(single) == value ? fmt::format("{}", single)  // the digits as written
+                           : inRange(value, range) ? fmt::format("{}, in single precision {}", value, single)
+                                                   : fmt::format("{}", value);
+  fail(name, fmt::format("\"{}\" is {}; it must be {}", name, text, rangeText(range)));
 }
 
 float PluginReader::number(std::string_view name, float fallback, const Range& range) {
   const Property* p = find(name);
   if (!p) return fallback;
-  if (const auto* d = std::get_if<double>(&p->value)) return static_cast<float>(checkedNumber(name, *d, range));
-  if (const auto* i = std::get_if<int64_t>(&p->value))
-    return static_cast<float>(checkedNumber(name, static_cast<double>(*i), range));
+  if (const auto* d = std::get_if<double>(&p->value)) return checkedNumber(name, *d, range);
+  if (const auto* i = std::get_if<int64_t>(&p->value)) return checkedNumber(name, static_cast<double>(*i), range);
   fail(name, fmt::format("\"{}\" must be a float, not a {}", name, typeName(p->value)));
 }
 
@@ -94,7 +98,9 @@ int PluginReader::integer(std::string_view name, int fallback, const Range& rang
   const auto* i = std::get_if<int64_t>(&p->value);
   if (!i) fail(name, fmt::format("\"{}\" must be an integer, not a {}", name, typeName(p->value)));
   if (*i != static_cast<int>(*i)) fail(name, fmt::format("\"{}\" is too large", name));
-  return static_cast<int>(checkedNumber(name, static_cast<double>(*i), range));
+  if (!inRange(static_cast<double>(*i), range))
+    fail(name, fmt::format("\"{}\" is {}; it must be {}", name, *i, rangeText(range)));
+  return static_cast<int>(*i);
 }
 
 bool PluginReader::boolean(std::string_view name, bool fallback) {
@@ -142,12 +148,12 @@ Matrix4 PluginReader::transform(std::string_view name) {
   const auto* m = std::get_if<Matrix4>(&p->value);
   if (!m) fail(name, fmt::format("\"{}\" must be a transform, not a {}", name, typeName(p->value)));
   if (!m->isFinite()) fail(name, fmt::format("the transform \"{}\" is not finite", name));
-  const Affine single(*m);
-  if (!isFinite(single.x) || !isFinite(single.y) || !isFinite(single.z) || !isFinite(single.translation))
-    fail(name, fmt::format("the transform \"{}\" is too large", name));
+  if (!isFinite(Affine(*m))) fail(name, fmt::format("the transform \"{}\" is too large", name));
   if (!m->isAffine())
     fail(name, fmt::format("the transform \"{}\" is a projection; its last row must be 0 0 0 1", name));
   if (m->isSingular()) fail(name, fmt::format("the transform \"{}\" is singular: it flattens space", name));
+  if (!isFinite(Affine(m->inverse())))
+    fail(name, fmt::format("the transform \"{}\" is too small for its place: its inverse overflows", name));
   return *m;
 }
 

@@ -19,6 +19,7 @@ struct BuildDiagnostics {
 
   /// Throws, or warns where the build is lenient.
   void complain(const Error& error);
+  /// The error's text as a warning.
   void warn(const Error& error);
 };
 
@@ -64,6 +65,8 @@ class PluginReader {
   /// An error about a parameter's value (or at the plugin, where the parameter is absent).
   [[noreturn]] void fail(std::string_view parameter, std::string message, std::string hint = "",
                          std::vector<std::string> notes = {});
+  /// A warning about a parameter whose value asks for what is not done: `"pixel_format" is ignored: ...`.
+  void warnIgnored(std::string_view parameter, std::string_view why);
   /// An error about the plugin as a whole.
   [[noreturn]] void failHere(std::string message, std::string hint = "", std::vector<std::string> notes = {});
   /// Where a parameter's value stands.
@@ -74,7 +77,7 @@ class PluginReader {
 
  private:
   const Property* find(std::string_view name);
-  double checkedNumber(std::string_view name, double value, const Range& range);
+  float checkedNumber(std::string_view name, double value, const Range& range);
 
   const Node& node_;
   BuildDiagnostics& diagnostics_;

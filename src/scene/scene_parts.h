@@ -31,6 +31,7 @@ struct BuiltEnvironment {
   Image image;
   Discrete rows;
   std::vector<float> columns;
+  float brightest = 0;     ///< channel of a pixel, before the emitter's scale
   float meanRadiance = 0;  ///< over the sphere, mean of the channels, before the emitter's scale
 };
 

@@ -102,6 +102,7 @@ void describeTree(nanovdb::FloatGrid& grid, size_t bytes, GridInfo& info) {
   info.indexLo = arrayOf(content.lo), info.indexHi = arrayOf(content.hi);
   info.worldBounds = worldBounds(info);
   if (!std::isfinite(content.sum)) return;
+  info.valuesKnown = true;
   info.minimum = content.minimum, info.maximum = content.maximum;
   info.mean = static_cast<float>(content.sum / static_cast<double>(content.activeVoxels));
 }

@@ -76,6 +76,15 @@ std::string problemOf(const AlignedBytes& bytes) try {
 
 }  // namespace
 
+void requireSoundBox(const VolFile& file) {
+  const Bounds& b = file.bounds;
+  const Vec3 extent = b.extent();
+  if (isFinite(b.lo) && isFinite(b.hi) && isFinite(extent) && minComponent(extent) > 0) return;
+  throw Error(fmt::format("header says a box from ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}), which has no volume",
+                          b.lo.x, b.lo.y, b.lo.z, b.hi.x, b.hi.y, b.hi.z),
+              {{}, "leave out \"use_grid_bbox\" and place the grid by \"to_world\"", {}});
+}
+
 bool isVol(const AlignedBytes& bytes) {
   return bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0;
 }
@@ -132,6 +141,7 @@ GridInfo volInfo(const AlignedBytes& bytes) {
   const auto [lo, hi] = std::minmax_element(values.begin(), values.end());
   const double sum = std::accumulate(values.begin(), values.end(), 0.0);
   if (!std::isfinite(sum)) return info;
+  info.valuesKnown = true;
   info.minimum = *lo, info.maximum = *hi;
   info.mean = static_cast<float>(sum / static_cast<double>(values.size()));
   return info;

@@ -16,6 +16,9 @@ struct VolFile {
   size_t voxels() const { return static_cast<size_t>(nx) * static_cast<size_t>(ny) * static_cast<size_t>(nz); }
 };
 
+/// Throws Error unless the box is finite and has a volume. Files with a bad one are common and load: few ask for it.
+void requireSoundBox(const VolFile&);
+
 bool isVol(const AlignedBytes& bytes);
 VolFile parseVol(const AlignedBytes& bytes);
 

@@ -3,7 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <fstream>
+#include <system_error>
+
 #include "core/atomic_write.h"
+#include "core/extension.h"
 #include "volume/file_bytes.h"
 #include "volume/nvdb_file.h"
 #include "volume/vdb_module.h"
@@ -28,9 +33,33 @@ auto withFile(const std::filesystem::path& path, const Body& body) {
   }
 }
 
+VolumeFormat formatOf(const AlignedBytes& bytes) {
+  if (isVol(bytes)) return VolumeFormat::vol;
+  if (isVdb(bytes)) return VolumeFormat::vdb;
+  return isNvdb(bytes) ? VolumeFormat::nvdb : VolumeFormat::none;
+}
+
+AlignedBytes firstBytes(const std::filesystem::path& path) {
+  constexpr size_t kMagicBytes = 8;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return {};
+  AlignedBytes bytes(std::min<size_t>(kMagicBytes, std::filesystem::file_size(path, error)));
+  std::ifstream in(path, std::ios::binary);
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  return in ? std::move(bytes) : AlignedBytes();
+}
+
 [[noreturn]] void refuseFormat() { throw Error("is not a volume: known are .vol, .vdb and .nvdb"); }
 
 }  // namespace
+
+VolumeFormat volumeFormat(const std::filesystem::path& path) {
+  if (const VolumeFormat format = formatOf(firstBytes(path)); format != VolumeFormat::none) return format;
+  const std::string extension = lowerCaseExtension(path);
+  if (extension == ".vol") return VolumeFormat::vol;
+  if (extension == ".vdb") return VolumeFormat::vdb;
+  return extension == ".nvdb" ? VolumeFormat::nvdb : VolumeFormat::none;
+}
 
 std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const VolumeRequest& request,
                                        const GridOptions& options) {
@@ -52,7 +81,9 @@ RgbGrid loadRgbVolume(const std::filesystem::path& path) {
 Bounds volBounds(const std::filesystem::path& path) {
   return withFile(path, [&](const AlignedBytes& bytes) {
     if (!isVol(bytes)) throw Error("is not a .vol file; others carry a transform, not a box");
-    return parseVol(bytes).bounds;
+    const VolFile file = parseVol(bytes);
+    requireSoundBox(file);
+    return file.bounds;
   });
 }
 

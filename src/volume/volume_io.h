@@ -16,6 +16,11 @@ namespace virga {
 // Formats are told apart by content. Whatever is wrong with a file - missing, truncated, damaged, not a volume - is an
 // Error that names it.
 
+enum class VolumeFormat { none, vol, vdb, nvdb };
+
+/// By the file's first bytes; where those say nothing (or cannot be read), by its extension, in upper or lower case.
+VolumeFormat volumeFormat(const std::filesystem::path& path);
+
 struct VolumeRequest {
   std::string grid;  ///< "": the only one, or "density"; "density[1]": the second of that name
 };
@@ -28,7 +33,8 @@ std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const 
 /// A `.vol` of three channels, or of one, which becomes grey.
 RgbGrid loadRgbVolume(const std::filesystem::path& path);
 
-/// The box that a `.vol` says it covers; what Mitsuba's `use_grid_bbox` asks for. Other formats: an Error.
+/// The box that a `.vol` says it covers; what Mitsuba's `use_grid_bbox` asks for. A box without
+/// volume, and other formats: an Error.
 Bounds volBounds(const std::filesystem::path& path);
 
 struct GridInfo {
@@ -40,7 +46,8 @@ struct GridInfo {
   uint64_t activeVoxels = 0;
   std::array<int64_t, 3> indexLo{}, indexHi{};  ///< box of the active voxels, inclusive
   Bounds worldBounds;                           ///< of that box, voxels counted whole
-  float minimum = 0, maximum = 0, mean = 0;     ///< over active voxels; 0 where values are no scalars or are NaN
+  bool valuesKnown = false;                     ///< false where values are no scalars or are not finite
+  float minimum = 0, maximum = 0, mean = 0;     ///< over active voxels, where known
   size_t bytes = 0;                             ///< of the values or of the tree, in memory
   Matrix4 indexToWorld;
 };

@@ -65,6 +65,8 @@ TEST(Matrix4, SingularMeansFlat) {
   EXPECT_FALSE(something().isSingular());
   EXPECT_FALSE(Matrix4::scaling(1e-5, 1e-5, 1e-5).isSingular()) << "small is not flat";
   EXPECT_FALSE(Matrix4::scaling(1e9, 1e9, 1e9).isSingular());
+  EXPECT_FALSE(Matrix4::scaling(2e6, 1, 1).isSingular()) << "nor is thin";
+  EXPECT_FALSE(Matrix4::scaling(1e6, 1e-5, 1).isSingular());
   EXPECT_TRUE(Matrix4::scaling(1, 1, 0).isSingular());
   EXPECT_TRUE(Matrix4::scaling(0, 0, 0).isSingular());
   EXPECT_TRUE(Matrix4::scaling(1, 1, 1e-13).isSingular());

@@ -104,14 +104,15 @@ TEST(Camera, ScaleInItsTransformChangesNothing) {
   expectNear(plain->camera.ray(10, 20).ray.d, scaled->camera.ray(10, 20).ray.d, 1e-6f);
 }
 
-TEST(Camera, AnotherFilmSizeDropsTheCropWindow) {
+TEST(Camera, AnotherFilmSizeTakesTheCropWindowAlong) {
   const SceneDescription d = test::describe(
       sensor(number("fov", 90), whole("width", 100) + whole("height", 100) + whole("crop_offset_x", 50)));
   EXPECT_EQ(buildScene(d)->camera.width, 50);
   const SceneSnapshot scene = buildScene(d, {.filmSize = std::pair(64, 32)});
-  EXPECT_EQ(scene->camera.width, 64);
+  EXPECT_EQ(scene->camera.filmWidth, 64);
+  EXPECT_EQ(scene->camera.width, 32);
   EXPECT_EQ(scene->camera.height, 32);
-  EXPECT_EQ(scene->camera.cropX, 0);
+  EXPECT_EQ(scene->camera.cropX, 32);
   EXPECT_NEAR(scene->camera.tanY, 0.5, 1e-6);
 }
 

@@ -60,6 +60,7 @@ class PathMethod final : public Method {
     return static_cast<uint32_t>(y + c.cropY) * static_cast<uint32_t>(c.filmWidth) + static_cast<uint32_t>(x + c.cropX);
   }
   LayerRadiance tracePixel(const PathTracer<EmbreeRays>& tracer, int x, int y, const SampleId& id) const {
+    if (optionsForScene().maxDepth == 0) return {};  // a path of no segment does not even reach a lamp
     Sampler sampler(id);
     const Vec2 offset = scene_->filter.sample(sampler.next2D());
     const CameraRay ray =

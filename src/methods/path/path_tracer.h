@@ -173,7 +173,7 @@ class PathTracer {
       const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
       const float d = length(toLight);
       // Stop short of the light's own surface: beyond the errors of both ends, whose coordinates may be large.
-      tMax = d * (1 - 2 * kHitError) - kHitError * std::max(0.1f * maxComponent(abs(r.ray.o)), 1e-2f * scene_.scale);
+      tMax = d * (1 - 10 * kHitError) - kHitError * std::max(0.5f * maxComponent(abs(r.ray.o)), 5e-2f * scene_.scale);
       if (tMax <= 0) return 1;
       r.ray.d = toLight / d;
     }
