@@ -10,7 +10,7 @@ Both renderers make independent replicates (seeds 1, 2, ...). Of each scene:
 The pictures' outermost pixels do not count. A renderer that refuses a scene has a row that says so.
 
 Writes out/peers.json and, with --document, docs/results/peers.md. Exit code 1 if a scene was refused or a p-value is below
-0.0001 in either renderer. --control makes Virga's media a tenth thicker: then every scene with a medium must disagree.
+0.0001. --control makes Virga's media a tenth thicker: then scenes with a medium differ, as far as their noise lets them.
 """
 
 import argparse
@@ -66,7 +66,7 @@ def run_mitsuba(scene, options):
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode != 0:
         lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-        raise Refused(lines[-1] if lines else f"exit code {done.returncode}")
+        raise Refused(lines[-1].replace(f"{OUT}/", "") if lines else f"exit code {done.returncode}")
     return np.load(target), float(done.stdout.split()[-1])
 
 
@@ -91,7 +91,7 @@ def run_virga(scene, options):
         seconds += time.monotonic() - start
         if done.returncode != 0:
             first = next((line for line in done.stderr.splitlines() if "error:" in line), f"exit code {done.returncode}")
-            raise Refused(first.split("error: ")[-1])
+            raise Refused(first.split("error: ")[-1].replace(f"{OUT}/", ""))
         pictures.append(peer_data.read_picture(picture))
     return np.array(pictures), seconds
 
