@@ -114,6 +114,9 @@ Action addRender(CLI::App& app) {
               "FILE");
   addStopRules(app, o->stop);
   addParsed(
+      app, "--audit", [o](const std::string& t) { o->auditSeconds = positive("--audit", t); },
+      "Then spend SEC seconds of path on random pixels: the picture's bias and relMSE", "SEC");
+  addParsed(
       app, "--size", [o](const std::string& t) { o->size = imageSize(t); },
       "Size of the film in place of the scene's; a crop window scales with it", "WxH");
   addParsed(

@@ -25,6 +25,7 @@ struct RenderOptions {
   std::string method = "path";
   std::vector<std::string> outputs;
   StopRules stop;
+  std::optional<double> auditSeconds;  ///< to hold the finished picture against `path`
   std::optional<std::pair<int, int>> size;
   uint64_t seed = 0;
   int threads = 0;                    ///< 0: as many as there are

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "app/audit_report.h"
 #include "app/interrupt.h"
 #include "app/method_settings.h"
 #include "app/options.h"
@@ -40,9 +41,9 @@ std::vector<std::string> outputsOf(const RenderOptions& options) {
 
 // An --error that a method cannot keep is refused before it has cost hours.
 void requireErrorEstimate(const RenderOptions& options, const MethodInfo& method) {
-  if (!options.stop.relMse || method.accuracy != Accuracy::biased) return;
+  if (!options.stop.relMse || options.auditSeconds || method.accuracy != Accuracy::biased) return;
   throw Error(fmt::format("--error: \"{}\" is biased, so its noise does not tell its error", method.name),
-              {.position = {}, .hint = "use --passes or --time", .notes = {}});
+              {.position = {}, .hint = "add --audit SEC, or use --passes or --time", .notes = {}});
 }
 
 StopRules rulesFor(const RenderOptions& options, const Scene& scene) {
@@ -81,6 +82,7 @@ class RenderJob {
     report_.sceneFile = options.scene.file;
     report_.outputs = outputsOf(options);
     report_.threads = threads;
+    report_.relMseLimit = options.stop.relMse;
   }
 
   void run() {
@@ -96,6 +98,7 @@ class RenderJob {
       return std::make_unique<RenderSession>(scene, method_, RenderSession::Options{settings, layers});
     });
     renderPasses(*session);
+    audit(*session);
     write(*session);
   }
 
@@ -131,13 +134,46 @@ class RenderJob {
       say("interrupted: the picture holds {}{}\n", session.film().passes(), intendedText(rules));
   }
 
+  // Only passes know of a bias that comes from a setting: --error has counted nothing but noise then.
+  void warnOfBias(const RenderSession& session) {
+    if (options_.auditSeconds || !report_.outcome.biased || report_.outcome.reason != StopReason::error) return;
+    warn("{} is biased with these settings; --error has counted noise alone: add --audit SEC", session.info().name);
+  }
+
+  void audit(const RenderSession& session) {
+    warnOfBias(session);
+    if (!options_.auditSeconds) return;
+    if (interrupt_.requested()) return say("no audit: interrupted\n");
+    say("auditing for {}\n", durationText(*options_.auditSeconds));
+    report_.audit = timed(report_.timings.audit, [&] {
+      return auditPicture(session.scene(), session.film().beauty(), {*options_.auditSeconds, options_.seed},
+                          interrupt_.token());
+    });
+    if (report_.audit)
+      sayAudit(*report_.audit);
+    else
+      warn("no audit: {}", interrupt_.requested() ? "interrupted" : "the picture has no finite pixels");
+  }
+
+  void sayAudit(const AuditResult& audit) {
+    say("{}", auditText(audit));
+    if (audit.tooShort()) warn("the audit's relMSE may be off by more than it says: audit for longer");
+    if (audit.nonFinite > 0) warn("{} of the audit's pixels were left out: NaN or infinite", audit.nonFinite);
+    if (!options_.stop.relMse) return;
+    const Verdict verdict = verdictOf(audit, *options_.stop.relMse);
+    const std::string text = fmt::format("--error {:g}: {}", *options_.stop.relMse, verdictName(verdict));
+    if (verdict == Verdict::reached)
+      say("{}, says the audit\n", text);
+    else
+      warn("{}, says the audit", text);
+  }
+
   void write(const RenderSession& session) {
     warnOfNonFinite(session.film());
     warnOfBlack(session.film());
     const auto shield = interrupt_.shield();
     const Stopwatch watch;
-    writePictures(report_.outputs, developed(session, report_.outcome, report_.sceneFile,
-                                             options_.layers ? WithLayers::yes : WithLayers::no));
+    writePictures(report_.outputs, developed(session, report_, options_.layers ? WithLayers::yes : WithLayers::no));
     report_.timings.write = watch.seconds();
     report_.timings.total = total_.seconds();
     report_.timings.totalCpu = cpuSeconds();
@@ -147,9 +183,13 @@ class RenderJob {
 
   void warnOfNonFinite(const Film& film) {
     if (film.nonFiniteSamples() == 0) return;
-    report_.warnings.push_back(
-        fmt::format("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
-                    film.nonFiniteSamples()));
+    warn("{} samples were NaN or infinite: their pixels are so in the EXR and magenta in the PNG",
+         film.nonFiniteSamples());
+  }
+
+  template <class... Args>
+  void warn(fmt::format_string<Args...> format, Args&&... args) {
+    report_.warnings.push_back(fmt::format(format, std::forward<Args>(args)...));
     say("warning: {}\n", report_.warnings.back());
   }
 

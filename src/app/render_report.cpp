@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "app/audit_report.h"
 #include "app/stopwatch.h"
 
 namespace virga::app {
@@ -18,21 +19,22 @@ std::string_view biasClass(const RenderSession& session, const LoopOutcome& outc
   return accuracyName(outcome.biased && accuracy == Accuracy::unbiased ? Accuracy::biased : accuracy);
 }
 
-Metadata metadata(const RenderSession& session, const LoopOutcome& outcome, const std::string& sceneFile) {
+Metadata metadata(const RenderSession& session, const RenderReport& report) {
   Metadata m;
   m["virga.version"] = VIRGA_VERSION;
-  m["virga.scene"] = sceneFile;
+  m["virga.scene"] = report.sceneFile;
   m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
   m["virga.method"] = std::string(session.info().name);
   for (const auto& [name, value] : session.method().settingsInForce())
     m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
   m["virga.seed"] = std::to_string(session.settings().seed);
   m["virga.passes"] = session.film().passes();
-  m["virga.seconds"] = outcome.state.seconds;
-  m["virga.bias"] = std::string(biasClass(session, outcome));
+  m["virga.seconds"] = report.outcome.state.seconds;
+  m["virga.bias"] = std::string(biasClass(session, report.outcome));
   m["virga.non_finite_samples"] = static_cast<int64_t>(session.film().nonFiniteSamples());
   m["virga.replicates"] = int64_t{Film::kReplicates};
   if (const auto error = session.film().estimatedRelMse()) m["virga.estimated_relmse"] = *error;
+  if (report.audit) addAudit(m, *report.audit);
   return m;
 }
 
@@ -48,8 +50,9 @@ void addLayers(const Film& film, LayeredImage& picture) {
 }
 
 Json timingsJson(const Timings& t) {
-  return {{"load", t.load},   {"build", t.build},          {"prepare", t.prepare},    {"render", t.render},
-          {"write", t.write}, {"render_cpu", t.renderCpu}, {"total_cpu", t.totalCpu}, {"total", t.total}};
+  return {{"load", t.load},   {"build", t.build}, {"prepare", t.prepare},      {"render", t.render},
+          {"audit", t.audit}, {"write", t.write}, {"render_cpu", t.renderCpu}, {"total_cpu", t.totalCpu},
+          {"total", t.total}};
 }
 
 Json sceneJson(const RenderSession& session, const std::string& file) {
@@ -75,12 +78,11 @@ double samplesPerSecond(const RenderSession& session, const RenderState& state) 
 
 std::string hashText(uint64_t hash) { return fmt::format("{:016x}", hash); }
 
-LayeredImage developed(const RenderSession& session, const LoopOutcome& outcome, const std::string& sceneFile,
-                       WithLayers withLayers) {
+LayeredImage developed(const RenderSession& session, const RenderReport& report, WithLayers withLayers) {
   LayeredImage picture;
   picture.beauty = session.film().beauty();
   if (withLayers == WithLayers::yes) addLayers(session.film(), picture);
-  picture.metadata = metadata(session, outcome, sceneFile);
+  picture.metadata = metadata(session, report);
   return picture;
 }
 
@@ -95,6 +97,7 @@ std::string statsJson(const RenderSession& session, const RenderReport& report) 
                      {"seconds", timingsJson(report.timings)},
                      {"samples_per_second", samplesPerSecond(session, report.outcome.state)},
                      {"estimated_relmse", error ? Json(*error) : Json(nullptr)},
+                     {"audit", report.audit ? auditJson(*report.audit, report.relMseLimit) : Json(nullptr)},
                      {"non_finite_samples", session.film().nonFiniteSamples()},
                      {"peak_resident_bytes", peakResidentBytes()},
                      {"warnings", report.warnings},

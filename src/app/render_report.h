@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "app/render_loop.h"
 #include "image/image_io.h"
+#include "methods/audit.h"
 #include "methods/render_session.h"
 
 namespace virga::app {
 
 enum class WithLayers { no, yes };
 
-/// The film's beauty with metadata; with layers, also all that the film holds, and the variances where there are any.
-LayeredImage developed(const RenderSession&, const LoopOutcome&, const std::string& sceneFile, WithLayers);
-
 /// Where the time of a render went [s].
 struct Timings {
   double load = 0, build = 0, prepare = 0, render = 0, write = 0, total = 0;
+  double audit = 0;
   double renderCpu = 0;  ///< user and system, of rendering alone
   double totalCpu = 0;
 };
@@ -28,9 +28,14 @@ struct RenderReport {
   std::vector<std::string> outputs;
   std::vector<std::string> warnings;
   LoopOutcome outcome;
+  std::optional<AuditResult> audit;
+  std::optional<double> relMseLimit;  ///< for the audit to judge
   Timings timings;
   int threads = 0;
 };
+
+/// The film's beauty with metadata; with layers, also all that the film holds, and the variances where there are any.
+LayeredImage developed(const RenderSession&, const RenderReport&, WithLayers);
 
 /// As JSON text.
 std::string statsJson(const RenderSession&, const RenderReport&);

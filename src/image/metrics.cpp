@@ -15,8 +15,7 @@
 namespace virga {
 namespace {
 
-constexpr double kRelativeFloor = 0.01;  // keeps relative errors of black pixels finite; the papers' value
-constexpr double kRounding = 1e-6;       // relative difference of two float means of the same value
+constexpr double kRounding = 1e-6;  // relative difference of two float means of the same value
 
 void checkSameSize(const Image& a, const Image& b) {
   if (a.width == b.width && a.height == b.height) return;

@@ -7,6 +7,9 @@
 
 namespace virga {
 
+/// Keeps relative errors of black pixels finite; the papers' value.
+inline constexpr double kRelativeFloor = 0.01;
+
 /// How far a picture a is from its reference b. All means run over pixels and channels, in double; pixels that are not
 /// finite in a or in b are left out and counted. The result does not depend on the number of threads.
 struct Metrics {

@@ -87,6 +87,7 @@ TEST_F(CommandLine, WrongUsageIsExitCode2WithOneMessage) {
       {{"render", "fog.xml", "--spp", "many"}, "--spp"},
       {{"render", "fog.xml", "--spp", "0"}, "--spp 0"},
       {{"render", "fog.xml", "--spp", "-1"}, "--spp"},
+      {{"render", "fog.xml", "--audit", "0"}, "--audit 0"},
       {{"render", "fog.xml", "--spp", "2", "--passes", "2"}, "--passes"},
       {{"render", "fog.xml", "--time", "nan"}, "--time nan"},
       {{"render", "fog.xml", "--error", "inf"}, "--error inf"},
@@ -263,6 +264,45 @@ TEST_F(CommandLine, TimeAndErrorStopByThemselves) {
 }
 
 // ---- files ----------------------------------------------------------------------------------------------------------
+
+TEST_F(CommandLine, AnAuditTellsHowWrongAPictureIs) {
+  const Ended r = run({"render", "fog.xml", "--spp", "64", "--set", "path.max_depth=2", "--audit", "0.5", "--stats",
+                       "stats.json", "-o", "a.exr"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_TRUE(contains(r.err, "audit: bias")) << r.err;
+  EXPECT_TRUE(contains(r.err, "audit: relMSE")) << r.err;
+  const nlohmann::json audit = json("stats.json")["audit"];
+  EXPECT_LT(audit["bias"]["high"], 0) << "paths of two segments lack multiple scattering";
+  EXPECT_GE(audit["samples"], 4);
+  EXPECT_GT(json("stats.json")["seconds"]["audit"], 0);
+  const LayeredImage made = readLayeredImage(scratch_.path("a.exr"));
+  for (const char* name : {"bias", "bias_low", "bias_high", "relmse", "relmse_low", "relmse_high"})
+    EXPECT_TRUE(made.metadata.contains(std::string("virga.audit.") + name)) << name;
+  EXPECT_EQ(run({"render", "fog.xml", "-o", "b.exr", "--stats", "stats.json"}).exitCode, 0);
+  EXPECT_TRUE(json("stats.json")["audit"].is_null());
+}
+
+TEST_F(CommandLine, AnAuditJudgesTheErrorThatWasAskedFor) {
+  const auto verdict = [&](const Names& more) {
+    Names all = {"render", "fog.xml", "--audit", "0.3", "--stats", "stats.json", "-o", "a.exr"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Ended r = run(all);
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+    EXPECT_TRUE(contains(r.err, "says the audit")) << r.err;
+    return json("stats.json")["audit"]["error"]["verdict"].get<std::string>();
+  };
+  EXPECT_EQ(verdict({"--error", "1000"}), "reached");
+  EXPECT_EQ(verdict({"--error", "1e-3", "--passes", "1"}), "not reached");
+}
+
+TEST_F(CommandLine, AnInterruptEndsTheAuditAndKeepsThePicture) {
+  Program program(scratch_, {"render", "fog.xml", "--audit", "1000", "-o", "a.exr"});
+  ASSERT_TRUE(program.waitForStderr("auditing"));
+  program.signal(SIGINT);
+  const Ended r = program.wait();
+  EXPECT_EQ(r.exitCode, 0) << r.err;
+  EXPECT_EQ(picture("a.exr").width, 24);
+}
 
 TEST_F(CommandLine, AnOutputStaysAsItWasWhenTheRenderFails) {
   scratch_.write("old.exr", "precious");

@@ -2,7 +2,7 @@
 #include "methods/path/path_method.h"
 
 #include "core/parallel.h"
-#include "methods/path/path_tracer.h"
+#include "methods/path/path_pixels.h"
 #include "methods/settings_reader.h"
 
 namespace virga {
@@ -32,9 +32,7 @@ class PathMethod final : public Method {
   }
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
-    const EmbreeRays rays{*scene_->surfaceRays, *scene_->boundaryRays};
-    const PathOptions options = optionsForScene();
-    const PathTracer<EmbreeRays> tracer(scene_->view, rays, options);
+    const PathPixels pixels(*scene_, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     constexpr int kTile = 16;
@@ -43,7 +41,7 @@ class PathMethod final : public Method {
       const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
       for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
         for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x)
-          frame.set(x, y, tracePixel(tracer, x, y, {seed_, replicate, pixelStream(x, y), sample}));
+          frame.set(x, y, pixels.sample(x, y, {seed_, replicate, pixelStream(x, y), sample}));
     });
     return {.completed = !stop.stop_requested()};
   }
@@ -58,14 +56,6 @@ class PathMethod final : public Method {
   uint32_t pixelStream(int x, int y) const {
     const PerspectiveCamera& c = scene_->camera;
     return static_cast<uint32_t>(y + c.cropY) * static_cast<uint32_t>(c.filmWidth) + static_cast<uint32_t>(x + c.cropX);
-  }
-  LayerRadiance tracePixel(const PathTracer<EmbreeRays>& tracer, int x, int y, const SampleId& id) const {
-    if (optionsForScene().maxDepth == 0) return {};  // a path of no segment does not even reach a lamp
-    Sampler sampler(id);
-    const Vec2 offset = scene_->filter.sample(sampler.next2D());
-    const CameraRay ray =
-        scene_->camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
-    return tracer.trace(ray, sampler);
   }
 
   SceneSnapshot scene_;
