@@ -33,6 +33,10 @@ void linkViews(Scene& scene, const Scene::Parts& parts) {
   view.media = viewOf(parts.media);
   view.emitters = viewOf(parts.emitters);
   view.emitterChoice = parts.emitterChoice.view();
+  for (const MediumView& m : parts.media) {
+    view.chromatic |= !m.grey;
+    view.emissive |= m.emits;
+  }
 }
 
 void measureBounds(Scene& scene, const Scene::Parts& parts) {
@@ -82,8 +86,8 @@ void warnOfOverlaps(BuildContext& context) {
 // What makes a picture black, or leaves light out, without being an error.
 void warnOfDarkness(BuildContext& context) {
   const Scene::Parts& parts = context.parts;
-  if (!(parts.emitterChoice.total() > 0))
-    context.diagnostics.warnings.push_back("warning: the scene has no emitter that shines: its picture is black");
+  if (!(parts.emitterChoice.total() > 0) && !context.scene.view.emissive)
+    context.diagnostics.warnings.push_back("warning: nothing in the scene shines: its picture is black");
   const bool points =
       std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
   const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {

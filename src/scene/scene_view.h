@@ -35,6 +35,8 @@ struct SceneView {
   View<MediumView> media;
   View<EmitterView> emitters;
   DiscreteView emitterChoice;  ///< by power
+  bool chromatic = false;      ///< some medium's extinction differs between the channels
+  bool emissive = false;       ///< some medium emits light
   int environment = -1;        ///< index of the constant or environment emitter, if any
   MediaState cameraMedia;      ///< where camera rays start
   Bounds bounds;               ///< of all shapes

@@ -16,7 +16,10 @@ struct EquiangularSegment {
   bool largeLights = false;  ///< to be aimed at, too
   Ray ray;
   float t0 = 0, t1 = 0;  ///< t1 may be infinite
-  float sigmaT = 0;      ///< [1/unit]
+  float sigmaT = 0;      ///< [1/unit] of the densest channel
+  bool grey = true;
+  Rgb spectrum{1, 1, 1};  ///< of sigma_t, relative to sigmaT
+  Rgb choice{1, 0, 0};    ///< probability with which each channel draws the free flight
 
   VIRGA_HD bool active() const { return medium >= 0; }
   VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
@@ -25,9 +28,16 @@ struct EquiangularSegment {
     return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight);
   }
 
-  /// Density of a free flight that ends at t [1/unit].
-  VIRGA_HD float freeFlightPdf(float t) const { return sigmaT * transmittanceTo(t); }
-  VIRGA_HD float transmittanceTo(float t) const { return std::exp(-sigmaT * (t - t0)); }
+  /// sigma_t tau(t0, t): density of a flight of each channel that ends at t [1/unit].
+  VIRGA_HD Rgb flight(float t) const {
+    const float depth = sigmaT * (t - t0);
+    return grey ? Rgb(sigmaT * std::exp(-depth)) : spectrum * exp(spectrum * -depth) * sigmaT;
+  }
+  /// Density with which a path's flight ends at t [1/unit].
+  VIRGA_HD float freeFlightPdf(float t) const {
+    const Rgb f = flight(t);
+    return grey ? f.r : choice.r * f.r + choice.g * f.g + choice.b * f.b;
+  }
 
   struct Sample {
     float t, pdf;  ///< pdf in [1/unit]; 0: no sample

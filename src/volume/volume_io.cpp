@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <fstream>
+
 #include "core/atomic_write.h"
 #include "volume/file_bytes.h"
 #include "volume/nvdb_file.h"
@@ -47,6 +49,11 @@ RgbGrid loadRgbVolume(const std::filesystem::path& path) {
     if (!isVol(bytes)) throw Error("is not a .vol file; only those hold colours");
     return loadRgbVol(bytes);
   });
+}
+
+bool holdsColors(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return volChannels(in) == 3;
 }
 
 Bounds volBounds(const std::filesystem::path& path) {

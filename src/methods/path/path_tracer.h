@@ -74,8 +74,9 @@ class PathTracer {
 
   /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
   static constexpr int kStratifiedBounces = 4;
-  /// Ends paths in closed white furnaces.
-  static constexpr float kMaxSurvival = 0.98f;
+  /// Ends paths in closed white furnaces, where light is infinite. So near to 1 that paths in thick white media gain
+  /// next to nothing by it: at 0.98, weights grew faster than paths died from 13 mean free paths on.
+  static constexpr float kMaxSurvival = 1 - 0x1p-16f;
 
   VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
     return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
@@ -99,29 +100,38 @@ class PathTracer {
     MediaState segmentMedia;
     EquiangularSegment segment;
     Collision collision;
+    SpectralFlight spectral(path.throughput, scene_.chromatic ? one(path, sampler) : 0.f);
+    Rgb glow;
     bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
       if (walk.media.vacuum()) return true;
       if (std::exchange(first, false)) {
-        segment = equiangularSegment(walk, t0, t1, path.depth < options_.equiangularDepth);
+        segment = equiangularSegment(path, walk, t0, t1);
         if (segment.active()) segmentMedia = walk.media;
       }
-      collision = sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      collision = scene_.chromatic ? sampleCollision(scene_, walk, t0, t1, sampler.stream(), spectral)
+                                   : sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      // What glows before a free flight's end counts in full: in expectation that is the transmittance.
+      if (scene_.emissive) glow += estimateEmission(scene_, walk, t0, std::min(t1, collision.t), sampler.stream());
       return !collision.found();
     });
     if (segment.active() && mayScatter(path)) connectEquiangular(path, segment, segmentMedia, sampler);
+    if (scene_.chromatic) path.throughput *= spectral.weight(path.throughput);
+    if (scene_.emissive) path.add(path.layers, glow);
     if (collision.found()) return scatterInMedium(path, walk.media, collision, segment, sampler);
     if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
     addEnvironment(path);
     return false;
   }
 
-  VIRGA_HD EquiangularSegment equiangularSegment(const MediaRay& r, float t0, float t1, bool largeLights) const {
+  VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
+    const bool largeLights = path.depth < options_.equiangularDepth;
     if (r.media.count() != 1 || !(largeLights || hasSmallLights_)) return {};
     const int index = r.media.medium(0);
     const MediumView& medium = scene_.media[index];
     if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
-    return {index, largeLights, r.ray, t0, t1, medium.sigmaT};
+    const Rgb choice = path.throughput / (path.throughput.r + path.throughput.g + path.throughput.b);
+    return {index, largeLights, r.ray, t0, t1, medium.sigmaT, medium.grey, medium.spectrum, choice};
   }
   VIRGA_HD static bool hasSmallLights(const SceneView& scene) {
     for (const EmitterView& e : scene.emitters)
@@ -167,17 +177,17 @@ class PathTracer {
   /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way.
   /// `r` starts at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it
   /// is expected to.
-  VIRGA_HD float visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
+  VIRGA_HD Rgb visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
     float tMax = kInfinity;
     if (!std::isinf(light.distance)) {
       const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
       const float d = length(toLight);
       // Stop short of the light's own surface: beyond the errors of both ends, whose coordinates may be large.
       tMax = d * (1 - 2 * kHitError) - kHitError * std::max(0.1f * maxComponent(abs(r.ray.o)), 1e-2f * scene_.scale);
-      if (tMax <= 0) return 1;
+      if (tMax <= 0) return Rgb(1.f);
       r.ray.d = toLight / d;
     }
-    if (rays_.occluded(r.ray, tMax)) return 0;
+    if (rays_.occluded(r.ray, tMax)) return {};
     return transmittance(scene_, rays_, r, tMax, sampler.stream());
   }
 
@@ -224,11 +234,11 @@ class PathTracer {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
       w = weight(own, flight * choice.probability * connection, flight * medium.phase.pdf(wo, light.wi));
     }
-    const float seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
+    const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
     layers.scatter(LayerPath::Vertex::medium);
-    // sigma_s tau = albedo * flight
-    path.add(layers, medium.albedoAt(x) * light.radiance * (flight * phase * seen * w / own));
+    // sigma_s tau = albedo * sigma_t tau
+    path.add(layers, medium.albedoAt(x) * segment.flight(distance.t) * light.radiance * seen * (phase * w / own));
   }
 
   /// Technique A at a medium vertex.
@@ -247,8 +257,8 @@ class PathTracer {
       const float flight = segment.freeFlightPdf(path.last.t);
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
-    const float seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
-    if (seen > 0) path.add(path.layers, c.light.radiance * (medium.phase.value(wo, c.light.wi) * seen * w / own));
+    const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
+    path.add(path.layers, c.light.radiance * seen * (medium.phase.value(wo, c.light.wi) * w / own));
   }
 
   /// Technique A' at a surface vertex.
@@ -262,8 +272,8 @@ class PathTracer {
     if (isBlack(value)) return;
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
-    const float seen = visibility(leaveSurface(point, c.light.wi, media), point.p, c.light, sampler);
-    if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
+    const Rgb seen = visibility(leaveSurface(point, c.light.wi, media), point.p, c.light, sampler);
+    path.add(path.layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
   }
 
   // --- vertices ---
