@@ -65,6 +65,11 @@ void buildRectangle(BuildContext&, PluginReader& reader, Role, BuiltShape& shape
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
   finishMesh(shape);
+  const std::vector<Vec3>& p = shape.mesh.positions;
+  const bool mirrored = toWorld.determinant3() < 0;  // the normal is along edgeX x edgeY
+  const RectangleView r{p[0], p[mirrored ? 3 : 1] - p[0], p[mirrored ? 1 : 3] - p[0]};
+  const bool sheared = std::fabs(dot(r.edgeX, r.edgeY)) > 1e-5f * length(r.edgeX) * length(r.edgeY);
+  if (!sheared) shape.rectangle = r;
 }
 
 void buildCube(BuildContext&, PluginReader& reader, Role role, BuiltShape& shape) {

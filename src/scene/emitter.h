@@ -6,6 +6,7 @@
 #include "core/transform.h"
 #include "core/warp.h"
 #include "scene/shape.h"
+#include "scene/spherical_rectangle.h"
 
 namespace virga {
 
@@ -85,6 +86,8 @@ struct EmitterView {
   int shape = -1;                        ///< area: index of its surface
   DiscreteView triangles;                ///< area, mesh: by area
   float area = 0;                        ///< area [unit^2]
+  bool isRectangle = false;              ///< area: a rectangle...
+  RectangleView rectangle;               ///< ...this one
   EnvironmentView environment;
 
   VIRGA_HD bool infinite() const {
@@ -169,6 +172,10 @@ VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& em
     const float d = distance(x, shape.center);
     if (seenAsCone(shape, d)) return 1 / (kTwoPi * coneHeight(shape.radius, d));
   }
+  if (emitter.isRectangle) {
+    const SphericalRectangle seen(emitter.rectangle, x);
+    if (seen.usable()) return 1 / seen.solidAngle();
+  }
   return uniformPointPdf(emitter, x, on, normal);
 }
 
@@ -184,6 +191,15 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
   if (cosLight <= 0) return {};
   const float pdf = on.areaPdf * d2 / cosLight;
   return {wi, d, emitter.value, pdf, false, pdf};
+}
+
+VIRGA_HD inline LightSample sampleRectangleLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
+  const SphericalRectangle seen(emitter.rectangle, x);
+  if (!seen.usable()) return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
+  const Vec3 normal = normalize(cross(emitter.rectangle.edgeX, emitter.rectangle.edgeY)) * shape.orientation;
+  LightSample s = towardPoint(emitter, x, {seen.sample(u), normal, 1 / emitter.area, false});
+  if (s.pdf > 0) s.pdf = 1 / seen.solidAngle();
+  return s;
 }
 
 VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +24,7 @@ struct BuiltShape {
   Discrete triangleChoice;  ///< by area
   float area = 0;           ///< [unit^2]
   bool box = false;         ///< a cube as a boundary
+  std::optional<RectangleView> rectangle;  ///< that the mesh is
 };
 
 /// An environment map with its sampling tables.

@@ -54,6 +54,7 @@ VIRGA_HD inline LightSample sampleLight(const SceneView& scene, const EmitterVie
     case EmitterView::Kind::area: {
       const ShapeView& shape = scene.surfaces[emitter.shape];
       if (shape.kind == ShapeView::Kind::sphere) return sampleSphereLight(shape, emitter, x, u);
+      if (emitter.isRectangle) return sampleRectangleLight(shape, emitter, x, u);
       return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
     }
     case EmitterView::Kind::constant:
