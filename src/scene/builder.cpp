@@ -48,6 +48,16 @@ void measureBounds(Scene& scene, const Scene::Parts& parts) {
   scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
 }
 
+void findMediaOfLights(const Scene& scene, Scene::Parts& parts) {
+  for (EmitterView& e : parts.emitters) {
+    if (!e.isLocal()) continue;
+    const LightPoint on = sampleLightPoint(scene.view, e, {0.5f, 0.5f});
+    MediaState media = mediaAt(scene, on.p + on.normal * (4 * kHitError * scene.view.scale));
+    if (media.vacuum()) media.setBase(scene.view.cameraMedia.base());  // fog without end is around the camera, too
+    if (media.count() == 1) e.medium = media.medium(0);
+  }
+}
+
 // In how many boxes a point may lie; no more than `enough` are counted. The deepest place begins at the lower x of one
 // box, the lower y of another and the lower z of a third.
 int deepestOverlap(const std::vector<Bounds>& boxes, int enough) {
@@ -175,6 +185,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   const int declared = scene->view.cameraMedia.base();
   scene->view.cameraMedia = mediaAt(*scene, scene->camera.toWorld.translation);
   if (declared != MediaState::kNone) scene->view.cameraMedia.setBase(declared);
+  findMediaOfLights(*scene, *parts);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);
   return scene;

@@ -89,6 +89,7 @@ struct EmitterView {
   bool isRectangle = false;              ///< area: a rectangle...
   RectangleView rectangle;               ///< ...this one
   EnvironmentView environment;
+  int medium = -1;  ///< index of the one medium that a light at a finite distance lies in; -1: none, or several
 
   VIRGA_HD bool infinite() const {
     return kind == Kind::directional || kind == Kind::constant || kind == Kind::environment;

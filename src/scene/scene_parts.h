@@ -20,10 +20,10 @@ struct BuiltShape {
   ShapeView view;  ///< geometry only
   std::shared_ptr<const RayShape> rays;
   Bounds bounds;
-  TriangleMesh mesh;        ///< world space; empty for spheres, disks and boxes
-  Discrete triangleChoice;  ///< by area
-  float area = 0;           ///< [unit^2]
-  bool box = false;         ///< a cube as a boundary
+  TriangleMesh mesh;                       ///< world space; empty for spheres, disks and boxes
+  Discrete triangleChoice;                 ///< by area
+  float area = 0;                          ///< [unit^2]
+  bool box = false;                        ///< a cube as a boundary
   std::optional<RectangleView> rectangle;  ///< that the mesh is
 };
 

@@ -11,6 +11,8 @@ struct EquiangularSegment {
   /// Lights of less area than this, in squared mean free paths, are small: near them, connections from free flights
   /// have a variance that is infinite (points) or nearly so. For larger ones hits by chance bound it.
   static constexpr float kSmallLight = 0.01f;
+  /// Optical depth below which the distance to a light says more about where to scatter than the transmittance does.
+  static constexpr float kThin = 4;
 
   int medium = -1;           ///< -1: there is none
   bool largeLights = false;  ///< to be aimed at, too
@@ -25,7 +27,12 @@ struct EquiangularSegment {
   VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
 
   VIRGA_HD bool aimsAt(const EmitterView& e) const {
-    return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight);
+    return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight || replacesFlights(e));
+  }
+  /// So much better than free flights that these need not be connected to the light at all: it lies in the same fog,
+  /// which is thin along this segment.
+  VIRGA_HD bool replacesFlights(const EmitterView& e) const {
+    return active() && e.medium == medium && sigmaT * (t1 - t0) < kThin;
   }
 
   /// sigma_t tau(t0, t): density of a flight of each channel that ends at t [1/unit].

@@ -10,15 +10,16 @@
 namespace virga {
 
 struct PathOptions {
-  int maxDepth = -1;         ///< segments; -1: no limit
-  int rrDepth = 5;           ///< scattering events before Russian roulette
-  int equiangularDepth = 1;  ///< segments on which technique B aims at large lights, too; at small ones it always does
+  int maxDepth = -1;  ///< segments; -1: no limit
+  int rrDepth = 5;    ///< scattering events before Russian roulette
+  int equiangularDepth =
+      1;  ///< segments on which technique B aims at all lights; at small ones and those in thin fog it always does
 };
 
 /// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
 ///
 /// Techniques for the light at a medium vertex, weighted against each other by the power heuristic:
-///   A  free flight to the vertex, then a point on a light;
+///   A  free flight to the vertex, then a point on a light (not at lights in thin fog: there B is better alone);
 ///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite
 ///   distance); C  free flight to the vertex, then the phase function, which meets the light.
 /// At a surface vertex: A' a point on a light, C' the BSDF.
@@ -26,7 +27,7 @@ template <class Rays>
 class PathTracer {
  public:
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
-      : scene_(scene), rays_(rays), options_(options), hasSmallLights_(hasSmallLights(scene)) {}
+      : scene_(scene), rays_(rays), options_(options), aims_(hasLightsToAimAt(scene)) {}
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)]. `behind`: from the near plane back to the eye [unit].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, float behind, Sampler& sampler) const {
@@ -126,17 +127,21 @@ class PathTracer {
 
   VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
     const bool largeLights = path.depth < options_.equiangularDepth;
-    if (r.media.count() != 1 || !(largeLights || hasSmallLights_)) return {};
+    if (r.media.count() != 1 || !(largeLights || aims_)) return {};
     const int index = r.media.medium(0);
     const MediumView& medium = scene_.media[index];
     if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
     const Rgb choice = path.throughput / (path.throughput.r + path.throughput.g + path.throughput.b);
     return {index, largeLights, r.ray, t0, t1, medium.sigmaT, medium.grey, medium.spectrum, choice};
   }
-  VIRGA_HD static bool hasSmallLights(const SceneView& scene) {
+  /// Are there lights that technique B aims at on every segment?
+  VIRGA_HD static bool hasLightsToAimAt(const SceneView& scene) {
     for (const EmitterView& e : scene.emitters)
-      for (const MediumView& m : scene.media)
-        if (m.homogeneous && e.isLocal() && e.area * square(m.sigmaT) < EquiangularSegment::kSmallLight) return true;
+      for (int m = 0; m < scene.media.size; ++m) {
+        const MediumView& medium = scene.media[m];
+        const bool isSmall = e.area * square(medium.sigmaT) < EquiangularSegment::kSmallLight;
+        if (medium.homogeneous && e.isLocal() && (isSmall || e.medium == m)) return true;
+      }
     return false;
   }
 
@@ -164,7 +169,7 @@ class PathTracer {
         const float flight = last.segment.freeFlightPdf(last.t);
         const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
         const float equiangular = choice * uniform * last.segment.pdf(point.p, last.t);
-        w = weight(flight * last.pdf, flight * connection, equiangular);
+        w = weight(flight * last.pdf, last.segment.replacesFlights(emitter) ? 0 : flight * connection, equiangular);
       } else {
         w = weight(last.pdf, connection);
       }
@@ -197,10 +202,12 @@ class PathTracer {
     float choice = 0;  ///< probability of the emitter
   };
 
+  /// Nothing for lights that technique B finds by itself on the segment to x.
   VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, Sampler& sampler) const {
     const auto choice = scene_.emitterChoice.sample(one(path, sampler));
-    const Vec2 u = pair(path, sampler);
-    return {sampleLight(scene_, scene_.emitters[choice.index], x, u), choice.index, choice.probability};
+    const EmitterView& emitter = scene_.emitters[choice.index];
+    if (path.last.segment.replacesFlights(emitter)) return {};
+    return {sampleLight(scene_, emitter, x, pair(path, sampler)), choice.index, choice.probability};
   }
 
   VIRGA_HD bool hasLights() const {
@@ -227,12 +234,13 @@ class PathTracer {
     const float phase = medium.phase.value(wo, light.wi);
     const float flight = segment.freeFlightPdf(distance.t);
     const float own = choice.probability * distance.pdf * light.pdf;
+    const float connected = segment.replacesFlights(emitter) ? 0 : flight * choice.probability;
     float w = 1;
     if (light.delta) {
-      w = weight(own, flight * choice.probability);
+      w = weight(own, connected);
     } else {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
-      w = weight(own, flight * choice.probability * connection, flight * medium.phase.pdf(wo, light.wi));
+      w = weight(own, connected * connection, flight * medium.phase.pdf(wo, light.wi));
     }
     const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
@@ -265,6 +273,7 @@ class PathTracer {
   VIRGA_HD void connectSurface(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
                                Sampler& sampler) const {
     if (!hasLights()) return;
+    path.last.segment = {};
     const Connection c = sampleConnection(path, point.p, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const Vec3 wi = side.frame.toLocal(c.light.wi);
@@ -352,7 +361,7 @@ class PathTracer {
   const SceneView& scene_;
   const Rays& rays_;
   const PathOptions& options_;
-  bool hasSmallLights_;
+  bool aims_;
 };
 
 }  // namespace virga
