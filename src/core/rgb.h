@@ -33,8 +33,10 @@ VIRGA_HD constexpr float maxComponent(Rgb c) { return std::max(c.r, std::max(c.g
 VIRGA_HD constexpr float minComponent(Rgb c) { return std::min(c.r, std::min(c.g, c.b)); }
 VIRGA_HD constexpr float mean(Rgb c) { return (c.r + c.g + c.b) / 3; }
 VIRGA_HD constexpr float luminance(Rgb c) { return 0.212671f * c.r + 0.715160f * c.g + 0.072169f * c.b; }
+VIRGA_HD constexpr Rgb lerp(Rgb a, Rgb b, float t) { return a + (b - a) * t; }
 VIRGA_HD constexpr bool isBlack(Rgb c) { return c.r == 0 && c.g == 0 && c.b == 0; }
 VIRGA_HD constexpr bool isGrey(Rgb c) { return c.r == c.g && c.g == c.b; }
+VIRGA_HD inline Rgb exp(Rgb c) { return {std::exp(c.r), std::exp(c.g), std::exp(c.b)}; }
 VIRGA_HD inline bool isFinite(Rgb c) { return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b); }
 
 }  // namespace virga

@@ -243,14 +243,17 @@ Film::Moments Film::moments(const std::vector<Weighted>& filled, const Value& va
   for (size_t r = 0; r < filled.size(); ++r) m[r] = value(*filled[r].replicate);
   Moments out;
   for (int c = 0; c < 3; ++c) {
-    double centre = 0, sum = 0;
+    double centre = 0, sum = 0, relative = 0;
     for (size_t r = 0; r < filled.size(); ++r) centre += filled[r].weight * static_cast<double>(m[r][c]);
     for (size_t r = 0; r < filled.size(); ++r) {
-      const double d = filled[r].weight * (static_cast<double>(m[r][c]) - centre);
+      const double share = filled[r].weight, own = static_cast<double>(m[r][c]), d = share * (own - centre);
+      const double others = share < 1 ? (centre - share * own) / (1 - share) : centre;
       sum += d * d;
+      relative += d * d / (others * others + 0.01);
     }
     out.mean[c] = centre;
     out.variance[c] = sum / rest;
+    out.relativeVariance[c] = relative / rest;
   }
   return out;
 }
@@ -283,9 +286,10 @@ Rgb Film::beautyAt(const Replicate& replicate, size_t pixel) {
 
 Image Film::beautyVariance() const { return varianceOf(beautyAt); }
 
-// The numerator is unbiased; the ratio is not, because the unknown true value of the denominator is replaced by the
-// mean: for symmetric noise a pixel's term is wrong by at most some three times its own relMSE, so the estimate is good
-// where it is small. It is too low while fireflies are yet to come: what no replicate has met shows in no spread.
+// The numerator is unbiased; the ratio is not, because the unknown true value of the denominator is replaced by a mean.
+// Were it the mean of all replicates, a firefly would raise it together with the numerator and hide itself: in fog the
+// error came out at less than half. The mean of the others does not know of it. What is left is the curvature of 1 /
+// x^2, which errs on the safe side, and what no replicate has met, which shows in no spread.
 std::optional<double> Film::estimatedRelMse() const {
   if (!hasVariance()) return std::nullopt;
   struct Sum {
@@ -295,7 +299,7 @@ std::optional<double> Film::estimatedRelMse() const {
   const auto errorOf = [&](int64_t i) {
     const Moments m = moments(filled, [i](const Replicate& r) { return beautyAt(r, static_cast<size_t>(i)); });
     Sum pixel{0, 3};
-    for (int c = 0; c < 3; ++c) pixel.error += m.variance[c] / (m.mean[c] * m.mean[c] + 0.01);
+    for (int c = 0; c < 3; ++c) pixel.error += m.relativeVariance[c];
     return std::isfinite(pixel.error) ? pixel : Sum{};
   };
   const Sum sum = deterministicReduce<Sum>(int64_t{width()} * height(), {}, errorOf, [](Sum x, Sum y) {

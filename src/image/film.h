@@ -71,8 +71,9 @@ class Film {
   bool hasVariance() const;
   Image beautyVariance() const;      ///< of the mean, per pixel and channel; programmer error without hasVariance()
   Image layerVariance(Layer) const;  ///< likewise
-  /// Expected relMSE of the beauty: mean over pixels and channels of variance / (mean^2 + 0.01). Pixels that are not
-  /// finite are left out (nonFiniteSamples() tells of them); nothing without hasVariance() or without a finite pixel.
+  /// Expected relMSE of the beauty: mean over pixels and channels of variance / (mean^2 + 0.01), each replicate's share
+  /// in the variance over the mean of the *others*. Pixels that are not finite are left out (nonFiniteSamples() tells
+  /// of them); nothing without hasVariance() or without a finite pixel.
   std::optional<double> estimatedRelMse() const;
 
  private:
@@ -86,6 +87,7 @@ class Film {
   };
   struct Moments {
     double mean[3], variance[3];
+    double relativeVariance[3];  ///< over mean^2 + 0.01
   };
 
   uint64_t countNonFinite(size_t begin, size_t end) const;

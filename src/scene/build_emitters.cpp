@@ -200,6 +200,8 @@ void addAreaEmitter(BuildContext& context, const Node& node, int surface, const 
   e.shape = surface;
   e.triangles = shape.triangleChoice.view();
   e.area = shape.area;
+  e.isRectangle = shape.rectangle.has_value();
+  if (e.isRectangle) e.rectangle = *shape.rectangle;
   reader.ignore("sampling_weight");
   reader.finish();
   context.parts.surfaces[static_cast<size_t>(surface)].emitter = static_cast<int>(context.parts.emitters.size());

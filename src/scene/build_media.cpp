@@ -7,24 +7,25 @@
 namespace virga {
 namespace {
 
-/// A volume plugin's grid and where it stands; exactly one of the pointers, or a constant.
+/// A volume plugin's values and where they stand: a constant, a grid, or a grid of colours with one that bounds them.
 struct VolumeField {
   Rgb constant;
-  std::shared_ptr<const Grid> grid;
+  std::shared_ptr<const Grid> grid;  ///< of an albedo: none
   std::shared_ptr<const RgbGrid> rgbGrid;
   Matrix4 indexToWorld;
 };
 
-enum class VolumeUse { density, albedo };
+/// What a volume is for. Extinction and emission may be numbers or colours.
+enum class VolumeUse { extinction, albedo, emission, number };
 
 Matrix4 unitCubeToBounds(const Bounds& b) {
   const Vec3 e = b.extent();
   return Matrix4::translation(b.lo.x, b.lo.y, b.lo.z) * Matrix4::scaling(e.x, e.y, e.z);
 }
 
-/// Index coordinates of nx x ny x nz voxels to the unit cube: centres at (i + 0.5) / n.
-Matrix4 voxelsToUnitCube(int nx, int ny, int nz) {
-  return Matrix4::scaling(1.0 / nx, 1.0 / ny, 1.0 / nz) * Matrix4::translation(0.5, 0.5, 0.5);
+/// Index coordinates of a box of voxels to the unit cube: centres at (i + 0.5) / n.
+Matrix4 voxelsToUnitCube(const RgbGridView& v) {
+  return Matrix4::scaling(1.0 / v.nx, 1.0 / v.ny, 1.0 / v.nz) * Matrix4::translation(0.5, 0.5, 0.5);
 }
 
 // Errors about a file's content gain the place in the scene that named the file.
@@ -69,17 +70,17 @@ VolumeField buildGridVolume(BuildContext& context, PluginReader& reader, VolumeU
         field.indexToWorld * unitCubeToBounds(loadedFrom(reader, "filename", [&] { return volBounds(path); }));
   const std::string key = fileKey(path);
   loadedFrom(reader, "filename", [&] {
-    if (use == VolumeUse::density) {
-      field.grid = context.cached<Grid>(&PartCache::grids, key, [&] { return loadVolume(path); });
-      field.indexToWorld = field.indexToWorld * field.grid->indexToWorld();
-    } else {
+    if (use == VolumeUse::albedo || (use != VolumeUse::number && holdsColors(path)))
       field.rgbGrid = context.cached<RgbGrid>(&PartCache::rgbGrids, key, [&]() -> std::shared_ptr<const RgbGrid> {
         return std::make_shared<const RgbGrid>(loadRgbVolume(path));
       });
-      const RgbGridView v = field.rgbGrid->view();
-      field.indexToWorld = field.indexToWorld * voxelsToUnitCube(v.nx, v.ny, v.nz);
-    }
+    if (use != VolumeUse::albedo)
+      field.grid = context.cached<Grid>(&PartCache::grids, key, [&]() -> std::shared_ptr<const Grid> {
+        return field.rgbGrid ? field.rgbGrid->largestChannel() : loadVolume(path);
+      });
   });
+  const Matrix4 voxels = field.grid ? field.grid->indexToWorld() : voxelsToUnitCube(field.rgbGrid->view());
+  field.indexToWorld = field.indexToWorld * voxels;
   return field;
 }
 
@@ -108,21 +109,17 @@ VolumeField buildVolume(BuildContext& context, const Node& node, VolumeUse use) 
   return field;
 }
 
-float greySigmaT(PluginReader& reader, std::string_view parameter, Rgb value) {
-  if (!isGrey(value))
-    reader.fail(
-        parameter,
-        fmt::format("\"{}\" differs between the channels; chromatic extinction is not supported yet", parameter),
-        "give one value");
-  return value.r;
+void setSigmaT(MediumView& medium, Rgb sigmaT) {
+  medium.sigmaT = maxComponent(sigmaT);
+  medium.spectrum = medium.sigmaT > 0 ? sigmaT / Rgb(medium.sigmaT) : Rgb(1.f);
 }
 
 // Mitsuba 0.x names both coefficients; 3 names their sum and the albedo.
 void readScatteringAndAbsorption(PluginReader& reader, MediumView& medium) {
   const Rgb sigmaS = reader.color("sigma_s", Rgb(0.f)), sigmaA = reader.color("sigma_a", Rgb(0.f)),
             sum = sigmaS + sigmaA;
-  medium.sigmaT = greySigmaT(reader, "sigma_s", sum);
-  medium.albedo = medium.sigmaT > 0 ? sigmaS / sum : Rgb(0.f);
+  setSigmaT(medium, sum);
+  for (int c = 0; c < 3; ++c) medium.albedo[c] = sum[c] > 0 ? sigmaS[c] / sum[c] : 0;
 }
 
 void readAlbedo(BuildContext& context, PluginReader& reader, MediumView& medium) {
@@ -143,21 +140,35 @@ void readAlbedo(BuildContext& context, PluginReader& reader, MediumView& medium)
   medium.albedo = reader.color("albedo", Rgb(0.75f), reader.unit());
 }
 
-void makeHomogeneous(MediumView& medium, float sigmaT) {
-  medium.homogeneous = true;
-  medium.sigmaT = sigmaT;
-}
-
-// sigma_t of a medium: a number, or a volume.
+// sigma_t of a medium: a colour, or a volume.
 void readSigmaT(BuildContext& context, PluginReader& reader, MediumView& medium) {
   const NodePtr volume = reader.child("volume", "sigma_t");
-  if (!volume) return makeHomogeneous(medium, greySigmaT(reader, "sigma_t", reader.color("sigma_t", Rgb(1.f))));
-  const VolumeField field = buildVolume(context, *volume, VolumeUse::density);
-  if (!field.grid) return makeHomogeneous(medium, greySigmaT(reader, "sigma_t", field.constant));
+  if (!volume) return setSigmaT(medium, reader.color("sigma_t", Rgb(1.f)));
+  const VolumeField field = buildVolume(context, *volume, VolumeUse::extinction);
+  if (!field.grid) return setSigmaT(medium, field.constant);
   medium.homogeneous = false;
   medium.sigmaT = 1;
   medium.density = field.grid->view();
+  if (field.rgbGrid) medium.densityColors = field.rgbGrid->view();
   medium.worldToDensity = Affine(field.indexToWorld.inverse());
+}
+
+// Light that the medium emits itself: a colour, or a volume, times a scale.
+void readEmission(BuildContext& context, PluginReader& reader, MediumView& medium) {
+  medium.emission = reader.color("emission_scale", Rgb(1.f));
+  const NodePtr volume = reader.child("volume", "emission");
+  if (!volume) {
+    medium.emission *= reader.color("emission", Rgb(0.f));
+  } else if (const VolumeField field = buildVolume(context, *volume, VolumeUse::emission); field.grid) {
+    medium.glowsEvenly = false;
+    medium.emissionGrid = field.grid->view();
+    if (field.rgbGrid) medium.emissionColors = field.rgbGrid->view();
+    medium.worldToEmission = Affine(field.indexToWorld.inverse());
+  } else {
+    medium.emission *= field.constant;
+  }
+  medium.emits = !isBlack(medium.emission);
+  if (!isFinite(medium.emission)) reader.fail("emission_scale", "\"emission\" times \"emission_scale\" is too large");
 }
 
 void requireTrackable(PluginReader& reader, const MediumView& medium) {
@@ -180,8 +191,10 @@ MediumView readMedium(BuildContext& context, PluginReader& reader) {
     readAlbedo(context, reader, medium);
     readSigmaT(context, reader, medium);
   }
-  medium.sigmaT *= reader.number("scale", 1, reader.nonNegative());
+  setSigmaT(medium, medium.spectrum * medium.sigmaT * reader.color("scale", Rgb(1.f)));
   if (!std::isfinite(medium.sigmaT)) reader.fail("scale", "\"scale\" times \"sigma_t\" is too large");
+  medium.grey = medium.spectrum == Rgb(1.f) && !medium.densityColors.values;
+  readEmission(context, reader, medium);
   if (!medium.homogeneous) requireTrackable(reader, medium);
   readPhase(context, reader, medium);
   if (!reader.boolean("sample_emitters", true))
@@ -195,13 +208,25 @@ MediumView buildHomogeneous(BuildContext& context, PluginReader& reader) {
   const MediumView medium = readMedium(context, reader);
   if (!medium.homogeneous || medium.albedoGrid.values)
     reader.failHere("a homogeneous medium cannot have a grid", "use type=\"heterogeneous\"");
+  if (!medium.glowsEvenly) reader.failHere("a homogeneous medium cannot glow by a grid", "use type=\"heterogeneous\"");
   return medium;
 }
 
+bool sameExtinction(const MediumView& a, const MediumView& b) {
+  return a.sigmaT == b.sigmaT && a.spectrum == b.spectrum && a.homogeneous == b.homogeneous &&
+         sameGrid(a.density, b.density) && a.densityColors.values == b.densityColors.values &&
+         a.worldToDensity == b.worldToDensity;
+}
+
+bool sameEmission(const MediumView& a, const MediumView& b) {
+  return a.emission == b.emission && a.glowsEvenly == b.glowsEvenly && sameGrid(a.emissionGrid, b.emissionGrid) &&
+         a.emissionColors.values == b.emissionColors.values && a.worldToEmission == b.worldToEmission;
+}
+
 bool sameMedium(const MediumView& a, const MediumView& b) {
-  return a.sigmaT == b.sigmaT && a.homogeneous == b.homogeneous && sameGrid(a.density, b.density) &&
-         a.worldToDensity == b.worldToDensity && a.albedo == b.albedo && a.albedoGrid.values == b.albedoGrid.values &&
-         a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase && a.phaseBlends == b.phaseBlends;
+  return sameExtinction(a, b) && sameEmission(a, b) && a.albedo == b.albedo &&
+         a.albedoGrid.values == b.albedoGrid.values && a.worldToAlbedo == b.worldToAlbedo && a.phase == b.phase &&
+         a.phaseBlends == b.phaseBlends;
 }
 
 // Media of equal content are one, as if they had been referred to: a boundary whose exterior repeats what surrounds it
@@ -221,7 +246,7 @@ bool sameGrid(const GridView& a, const GridView& b) {
 }
 
 ScalarField buildScalarVolume(BuildContext& context, const Node& volume) {
-  const VolumeField field = buildVolume(context, volume, VolumeUse::density);
+  const VolumeField field = buildVolume(context, volume, VolumeUse::number);
   if (field.grid) return {field.grid->view(), Affine(field.indexToWorld.inverse()), field.grid->maximum()};
   if (!isGrey(field.constant))
     throw Error("a volume of numbers is needed here, and this one has a colour",

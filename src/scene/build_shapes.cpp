@@ -3,6 +3,7 @@
 
 #include "scene/build_context.h"
 #include "scene/closed_mesh.h"
+#include "scene/smooth_normals.h"
 
 namespace virga {
 namespace {
@@ -76,6 +77,12 @@ void buildRectangle(BuildContext&, PluginReader& reader, Role role, BuiltShape& 
   toWorldSpace(shape.mesh, toWorld);
   keepOutside(shape.mesh, toWorld);
   finishMesh(shape, role);
+  const std::vector<Vec3>& p = shape.mesh.positions;
+  const bool mirrored = toWorld.determinant3() < 0;  // the normal is along edgeX x edgeY
+  RectangleView r{p[0], p[mirrored ? 3 : 1] - p[0], p[mirrored ? 1 : 3] - p[0]};
+  if (mirrored) std::swap(r.uvX, r.uvY);
+  const bool sheared = std::fabs(dot(r.edgeX, r.edgeY)) > 1e-5f * length(r.edgeX) * length(r.edgeY);
+  if (!sheared) shape.rectangle = r;
 }
 
 // Texture coordinates on the face of the unit cube with that outward normal, as in Mitsuba 3.
@@ -204,13 +211,15 @@ void buildMesh(BuildContext& context, PluginReader& reader, Role role, BuiltShap
   } catch (const Error& error) {
     throw error.at(reader.positionOf("filename"));
   }
-  if (reader.boolean("face_normals", false)) shape.mesh.normals.clear();
+  const bool flat = reader.boolean("face_normals", false);
+  if (flat) shape.mesh.normals.clear();
   // The pictures of OBJ files begin below, Mitsuba's above.
   if (reader.boolean("flip_tex_coords", format == MeshFormat::obj))
     for (Vec2& uv : shape.mesh.uvs) uv.y = 1 - uv.y;
   toWorldSpace(shape.mesh, reader.transform("to_world"));
   if (role != Role::surface) makeWindingAgree(shape.mesh);
   if (role == Role::boundary) turnOutward(shape.mesh);
+  if (!flat && role != Role::boundary && shape.mesh.normals.empty()) makeNormalsSmooth(shape.mesh);
   finishMesh(shape, role);
 }
 

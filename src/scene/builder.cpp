@@ -35,6 +35,10 @@ void linkViews(Scene& scene, const Scene::Parts& parts) {
   view.media = viewOf(parts.media);
   view.emitters = viewOf(parts.emitters);
   view.emitterChoice = parts.emitterChoice.view();
+  for (const MediumView& m : parts.media) {
+    view.chromatic |= !m.grey;
+    view.emissive |= m.emits;
+  }
 }
 
 void measureBounds(Scene& scene, const Scene::Parts& parts) {
@@ -44,6 +48,16 @@ void measureBounds(Scene& scene, const Scene::Parts& parts) {
   if (bounds.empty()) bounds.extend(scene.camera.toWorld.translation);
   scene.view.bounds = bounds;
   scene.view.scale = std::max(maxComponent(max(abs(bounds.lo), abs(bounds.hi))), 1e-6f);
+}
+
+void findMediaOfLights(const Scene& scene, Scene::Parts& parts) {
+  for (EmitterView& e : parts.emitters) {
+    if (!e.isLocal()) continue;
+    const LightPoint on = sampleLightPoint(scene.view, e, {0.5f, 0.5f});
+    MediaState media = mediaAt(scene, on.p + on.normal * (4 * kHitError * scene.view.scale));
+    if (media.vacuum()) media.setBase(scene.view.cameraMedia.base());  // fog without end is around the camera, too
+    if (media.count() == 1) e.medium = media.medium(0);
+  }
 }
 
 void warnOfOverlaps(BuildContext& context) {
@@ -65,8 +79,8 @@ void warnOfMedia(BuildContext& context) {
 // What makes a picture black, or leaves light out, without being an error.
 void warnOfDarkness(BuildContext& context) {
   const Scene::Parts& parts = context.parts;
-  if (!(parts.emitterChoice.total() > 0))
-    context.diagnostics.warnings.push_back("warning: the scene has no emitter that shines: its picture is black");
+  if (!(parts.emitterChoice.total() > 0) && !context.scene.view.emissive)
+    context.diagnostics.warnings.push_back("warning: nothing in the scene shines: its picture is black");
   const bool points =
       std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
   const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
@@ -166,6 +180,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   linkViews(*scene, *parts);
   warnOfDarkness(context);
   placeCamera(*scene);
+  findMediaOfLights(*scene, *parts);
   warnOfMedia(context);
   scene->warnings = context.diagnostics.warnings;
   scene->parts = std::move(parts);

@@ -6,6 +6,7 @@
 #include "core/transform.h"
 #include "core/warp.h"
 #include "scene/shape.h"
+#include "scene/spherical_rectangle.h"
 #include "scene/texture.h"
 
 namespace virga {
@@ -87,7 +88,10 @@ struct EmitterView {
   DiscreteView triangles;                ///< area, mesh: by area
   float area = 0;                        ///< area [unit^2]
   TextureView texture;                   ///< area: radiance over the surface, in place of `value`
+  bool isRectangle = false;              ///< area: a rectangle...
+  RectangleView rectangle;               ///< ...this one
   EnvironmentView environment;
+  int medium = -1;  ///< index of the one medium that a light at a finite distance lies in; -1: none, or several
 
   VIRGA_HD bool infinite() const {
     return kind == Kind::directional || kind == Kind::constant || kind == Kind::environment;
@@ -189,6 +193,10 @@ VIRGA_HD inline float areaLightPdf(const ShapeView& shape, const EmitterView& em
     const float d = distance(x, shape.center);
     if (seenAsCone(shape, d)) return 1 / (kTwoPi * coneHeight(shape.radius, d));
   }
+  if (emitter.isRectangle) {
+    const SphericalRectangle seen(emitter.rectangle, x);
+    if (seen.usable()) return 1 / seen.solidAngle();
+  }
   return uniformPointPdf(emitter, x, on, normal);
 }
 
@@ -204,6 +212,16 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
   if (cosLight <= 0) return {};
   const float pdf = on.areaPdf * d2 / cosLight;
   return {wi, d, emitter.radianceAt(on.uv), pdf, false, pdf};
+}
+
+VIRGA_HD inline LightSample sampleRectangleLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
+  const SphericalRectangle seen(emitter.rectangle, x);
+  if (!seen.usable()) return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
+  const Vec3 normal = normalize(cross(emitter.rectangle.edgeX, emitter.rectangle.edgeY)) * shape.orientation;
+  const Vec3 on = seen.sample(u);
+  LightSample s = towardPoint(emitter, x, {on, normal, 1 / emitter.area, false, emitter.rectangle.uvAt(on)});
+  if (s.pdf > 0) s.pdf = 1 / seen.solidAngle();
+  return s;
 }
 
 VIRGA_HD inline LightSample sampleSphereLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {

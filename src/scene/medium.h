@@ -8,11 +8,15 @@
 
 namespace virga {
 
-/// A participating medium: sigma_t(x) = sigmaT * density(x) [1/unit], the same for R, G and B; albedo may be coloured.
+/// A participating medium: sigma_t(x) = sigmaT * spectrum * density(x) [1/unit], and light that it emits itself.
 struct MediumView {
-  float sigmaT = 0;         ///< [1/unit] at density 1
+  float sigmaT = 0;         ///< [1/unit] at density 1, of the channel where it is greatest
+  Rgb spectrum{1, 1, 1};    ///< sigma_t of each channel, relative to that
+  bool grey = true;         ///< sigma_t is the same for all channels, everywhere
   bool homogeneous = true;  ///< density is 1 everywhere
   GridView density;
+  RgbGridView
+      densityColors;      ///< where it holds values they are the density, channel by channel, and `density` bounds them
   Affine worldToDensity;  ///< world to index coordinates of the density
 
   Rgb albedo{0.75f, 0.75f, 0.75f};
@@ -22,8 +26,18 @@ struct MediumView {
   PhaseFunction phase;
   PhaseBlends phaseBlends;  ///< of a mixture whose weights are not the same everywhere
 
-  VIRGA_HD float sigmaTAt(Vec3 p) const {
-    return homogeneous ? sigmaT : sigmaT * density.lookup(worldToDensity.point(p));
+  Rgb emission;  ///< radiance that a unit of length adds [W/(m^2 sr) / unit], times the grid's value if there is one
+  bool emits = false;       ///< anywhere
+  bool glowsEvenly = true;  ///< there is no grid
+  GridView emissionGrid;
+  RgbGridView emissionColors;  ///< as densityColors
+  Affine worldToEmission;      ///< world to index coordinates of the emission
+
+  VIRGA_HD Rgb sigmaTAt(Vec3 p) const {
+    if (homogeneous) return spectrum * sigmaT;
+    const Vec3 q = worldToDensity.point(p);
+    if (!densityColors.values) return spectrum * (sigmaT * density.lookup(q));
+    return density.supports(q) ? spectrum * densityColors.lookup(q) * sigmaT : Rgb();
   }
   VIRGA_HD Rgb albedoAt(Vec3 p) const { return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo; }
   VIRGA_HD PhaseFunction phaseAt(Vec3 p) const {

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,11 +20,12 @@ struct BuiltShape {
   ShapeView view;  ///< geometry only
   std::shared_ptr<const RayShape> rays;
   Bounds bounds;
-  TriangleMesh mesh;        ///< world space; empty for spheres, disks and cylinders
-  Discrete triangleChoice;  ///< by area
-  float area = 0;           ///< [unit^2]
-  bool box = false;         ///< a cube as a boundary
-  size_t openEdges = 0;     ///< of a shape that a medium fills; more than 0: it does not enclose a space
+  TriangleMesh mesh;                       ///< world space; empty for spheres, disks and cylinders
+  Discrete triangleChoice;                 ///< by area
+  float area = 0;                          ///< [unit^2]
+  bool box = false;                        ///< a cube as a boundary
+  size_t openEdges = 0;                    ///< of a shape that a medium fills; more than 0: it does not enclose a space
+  std::optional<RectangleView> rectangle;  ///< that the mesh is
 };
 
 /// An environment map with its sampling tables.

@@ -48,6 +48,8 @@ struct SceneView {
   View<MediumView> media;
   View<EmitterView> emitters;
   DiscreteView emitterChoice;  ///< by power
+  bool chromatic = false;      ///< some medium's extinction differs between the channels
+  bool emissive = false;       ///< some medium emits light
   int environment = -1;        ///< index of the constant or environment emitter, if any
   MediaState cameraMedia;      ///< at the point below, from where camera rays cross boundaries to their own starts
   Vec3 cameraMediaPoint;       ///< a little beside the eye
@@ -73,6 +75,7 @@ VIRGA_HD inline LightSample sampleLight(const SceneView& scene, const EmitterVie
     case EmitterView::Kind::area: {
       const ShapeView& shape = scene.surfaces[emitter.shape];
       if (shape.kind == ShapeView::Kind::sphere) return sampleSphereLight(shape, emitter, x, u);
+      if (emitter.isRectangle) return sampleRectangleLight(shape, emitter, x, u);
       return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
     }
     case EmitterView::Kind::constant:

@@ -11,23 +11,40 @@ struct EquiangularSegment {
   /// Lights of less area than this, in squared mean free paths, are small: near them, connections from free flights
   /// have a variance that is infinite (points) or nearly so. For larger ones hits by chance bound it.
   static constexpr float kSmallLight = 0.01f;
+  /// Optical depth below which the distance to a light says more about where to scatter than the transmittance does.
+  static constexpr float kThin = 4;
 
   int medium = -1;           ///< -1: there is none
   bool largeLights = false;  ///< to be aimed at, too
   Ray ray;
   float t0 = 0, t1 = 0;  ///< t1 may be infinite
-  float sigmaT = 0;      ///< [1/unit]
+  float sigmaT = 0;      ///< [1/unit] of the densest channel
+  bool grey = true;
+  Rgb spectrum{1, 1, 1};  ///< of sigma_t, relative to sigmaT
+  Rgb choice{1, 0, 0};    ///< probability with which each channel draws the free flight
 
   VIRGA_HD bool active() const { return medium >= 0; }
   VIRGA_HD bool contains(float t) const { return active() && t >= t0 && t <= t1; }
 
   VIRGA_HD bool aimsAt(const EmitterView& e) const {
-    return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight);
+    return active() && e.isLocal() && (largeLights || e.area * square(sigmaT) < kSmallLight || replacesFlights(e));
+  }
+  /// So much better than free flights that these need not be connected to the light at all: it lies in the same fog,
+  /// which is thin along this segment.
+  VIRGA_HD bool replacesFlights(const EmitterView& e) const {
+    return active() && e.medium == medium && sigmaT * (t1 - t0) < kThin;
   }
 
-  /// Density of a free flight that ends at t [1/unit].
-  VIRGA_HD float freeFlightPdf(float t) const { return sigmaT * transmittanceTo(t); }
-  VIRGA_HD float transmittanceTo(float t) const { return std::exp(-sigmaT * (t - t0)); }
+  /// sigma_t tau(t0, t): density of a flight of each channel that ends at t [1/unit].
+  VIRGA_HD Rgb flight(float t) const {
+    const float depth = sigmaT * (t - t0);
+    return grey ? Rgb(sigmaT * std::exp(-depth)) : spectrum * exp(spectrum * -depth) * sigmaT;
+  }
+  /// Density with which a path's flight ends at t [1/unit].
+  VIRGA_HD float freeFlightPdf(float t) const {
+    const Rgb f = flight(t);
+    return grey ? f.r : choice.r * f.r + choice.g * f.g + choice.b * f.b;
+  }
 
   struct Sample {
     float t, pdf;  ///< pdf in [1/unit]; 0: no sample

@@ -3,7 +3,7 @@
 
 #include "rays/ray_hit.h"
 #include "scene/scene_view.h"
-#include "transport/tracking.h"
+#include "transport/emission.h"
 
 namespace virga {
 
@@ -133,25 +133,36 @@ struct Collision {
 
 /// The first real collision within [t0, t1] in the media of the state. Coefficients add where media overlap, so the
 /// collision is the nearest of independent free flights.
-VIRGA_HD inline Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1,
-                                          Pcg32& random) {
+/// `spectral`, where there is one, takes part (SpectralFlight).
+template <class... Spectral>
+VIRGA_HD Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1, Pcg32& random,
+                                   Spectral&... spectral) {
   Collision nearest;
   for (int i = 0; i < r.media.count(); ++i) {
     const int medium = r.media.medium(i);
-    const float t = sampleFreeFlight(scene.media[medium], r.ray, t0, std::min(t1, nearest.t), random);
+    const float end = std::min(t1, nearest.t);
+    const float t = sampleFreeFlight(scene.media[medium], r.ray, t0, end, random, spectral...);
     if (t < nearest.t) nearest = {t, medium};
   }
   return nearest;
 }
 
+/// Unbiased estimate of the light that the media of the state add along [t0, t1] [W/(m^2 sr)].
+VIRGA_HD inline Rgb estimateEmission(const SceneView& scene, const MediaRay& r, float t0, float t1, Pcg32& random) {
+  Rgb sum;
+  for (int i = 0; i < r.media.count(); ++i)
+    sum += estimateEmission(scene.media[r.media.medium(i)], r.ray, t0, t1, random);
+  return sum;
+}
+
 /// Unbiased estimate of the transmittance along [0, tMax], null boundaries passed; surfaces are not looked at.
 template <class Rays>
-VIRGA_HD float transmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, Pcg32& random) {
-  float product = 1;
+VIRGA_HD Rgb transmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, Pcg32& random) {
+  Rgb product(1.f);
   walkMedia(scene, rays, r, tMax, [&](float t0, float t1) {
-    for (int i = 0; i < r.media.count() && product > 0; ++i)
+    for (int i = 0; i < r.media.count() && !isBlack(product); ++i)
       product *= estimateTransmittance(scene.media[r.media.medium(i)], r.ray, t0, t1, random);
-    return product > 0;
+    return !isBlack(product);
   });
   return product;
 }

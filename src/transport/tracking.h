@@ -5,6 +5,7 @@
 
 #include "core/random.h"
 #include "scene/medium.h"
+#include "transport/spectral_flight.h"
 
 namespace virga {
 
@@ -85,61 +86,117 @@ struct GridRay {
 
 VIRGA_HD inline float exponential(Pcg32& random) { return -std::log(1 - random.next()); }
 
+/// A point where a medium may have scattered.
+struct TentativeCollision {
+  float t;
+  Vec3 p;          ///< index coordinates of the density
+  float majorant;  ///< of the density there
+  bool inside;     ///< the grid's support
+
+  /// Density over majorant, in [0, 1]: the part of such collisions that are real.
+  VIRGA_HD float ratio(const MediumView& medium) const {
+    return inside ? medium.density.lookupInside(p) / majorant : 1.f;
+  }
+  VIRGA_HD Rgb ratios(const MediumView& medium) const {
+    return medium.densityColors.values ? medium.densityColors.lookup(p) / majorant : Rgb(ratio(medium));
+  }
+};
+
 /// Tentative collisions along [t0, t1] of a heterogeneous medium: a Poisson process of density majorant * sigmaT.
-/// visit(t, ratio) until it returns false; `ratio` in [0, 1] is the density at t over the majorant there, the part of
-/// collisions that are real.
-template <class Visit>
-VIRGA_HD void forEachTentativeCollision(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random,
-                                        Visit&& visit) {
+/// visit(collision) until it returns false; passed(length * majorant) for every piece between them.
+template <class Visit, class Passed>
+VIRGA_HD void forEachTentativeCollision(const MediumView& medium, float sigmaT, const Ray& ray, float t0, float t1,
+                                        Pcg32& random, Visit&& visit, Passed&& passed) {
   const GridRay g(medium, ray);
   float depth = exponential(random);  // optical depth left until the next one
   forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
-    const float mu = majorant * medium.sigmaT;
+    const float mu = majorant * sigmaT;
     for (float t = a;;) {
       const float here = (b - t) * mu;
       if (!(depth < here)) {
         depth -= here;
+        passed((b - t) * majorant);
         return true;
       }
       t += depth / mu;
-      if (!visit(t, inside ? medium.density.lookupInside(g.o + g.d * t) / majorant : 1.f)) return false;
+      passed(depth / sigmaT);
+      if (!visit(TentativeCollision{t, g.o + g.d * t, majorant, inside})) return false;
       depth = exponential(random);
     }
   });
 }
 
-/// Distance t in [t0, t1) of the next real collision, or infinity: density sigma_t(t) tau(t0, t). Analytic where the
-/// medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965; Szirmay-Kalos et al. 2011).
+struct IgnoreLength {
+  VIRGA_HD void operator()(float) const {}
+};
+
+/// Distance t in [t0, t1) of the next real collision in a grey medium, or infinity: density sigma_t(t) tau(t0, t).
+/// Analytic where the medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965;
+/// Szirmay-Kalos et al. 2011).
 VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
   if (medium.homogeneous) {
     const float t = t0 + exponential(random) / medium.sigmaT;
     return t < t1 ? t : kInfinity;
   }
   float found = kInfinity;
-  forEachTentativeCollision(medium, ray, t0, t1, random, [&](float t, float ratio) {
-    const bool real = random.next() < ratio;
-    if (real) found = t;
+  const auto visit = [&](const TentativeCollision& c) {
+    const bool real = random.next() < c.ratio(medium);
+    if (real) found = c.t;
     return !real;
-  });
+  };
+  forEachTentativeCollision(medium, medium.sigmaT, ray, t0, t1, random, visit, IgnoreLength{});
+  return found;
+}
+
+/// The flight of one channel, the hero's, through a medium of any colour; all that was drawn is noted in `spectral`.
+VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random,
+                                       SpectralFlight& spectral) {
+  if (medium.grey) return sampleFreeFlight(medium, ray, t0, t1, random);
+  const float sigmaT = medium.sigmaT * medium.spectrum[spectral.hero];
+  if (medium.homogeneous) {
+    const float t = sigmaT > 0 ? t0 + exponential(random) / sigmaT : kInfinity;
+    spectral.note(medium.spectrum, t < t1 ? 1 : 0, (std::min(t, t1) - t0) * medium.sigmaT);
+    return t < t1 ? t : kInfinity;
+  }
+  float found = kInfinity, length = 0;
+  int collisions = 0;
+  const auto visit = [&](const TentativeCollision& c) {
+    const Rgb ratios = c.ratios(medium);
+    const bool real = random.next() < ratios[spectral.hero];
+    spectral.note(real ? ratios : Rgb(1.f) - ratios);
+    ++collisions;
+    if (real) found = c.t;
+    return !real;
+  };
+  forEachTentativeCollision(medium, sigmaT, ray, t0, t1, random, visit, [&](float l) { length += l; });
+  spectral.note(medium.spectrum, collisions, length * medium.sigmaT);
   return found;
 }
 
 /// Below this a transmittance estimate plays Russian roulette.
 inline constexpr float kTransmittanceRoulette = 0.1f;
 
-/// Unbiased estimate of tau(t0, t1), in [0, 1]. Analytic where the medium is homogeneous, otherwise ratio tracking
-/// (Novak et al. 2014) on local majorants.
-VIRGA_HD inline float estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1,
-                                            Pcg32& random) {
-  if (medium.homogeneous) return medium.sigmaT > 0 ? std::exp(-medium.sigmaT * (t1 - t0)) : 1;
-  float transmittance = 1;
-  forEachTentativeCollision(medium, ray, t0, t1, random, [&](float, float ratio) {
-    transmittance *= 1 - ratio;
-    if (transmittance >= kTransmittanceRoulette) return true;
-    const bool survives = random.next() * kTransmittanceRoulette < transmittance;
-    transmittance = survives ? kTransmittanceRoulette : 0;
+/// Unbiased estimate of tau(t0, t1), each channel in [0, 1]. Analytic where the medium is homogeneous, otherwise ratio
+/// tracking (Novak et al. 2014) on local majorants of the densest channel.
+VIRGA_HD inline Rgb estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+  if (!(medium.sigmaT > 0)) return Rgb(1.f);
+  if (medium.homogeneous) {
+    const float depth = medium.sigmaT * (t1 - t0);
+    return medium.grey ? Rgb(std::exp(-depth)) : exp(medium.spectrum * -depth);
+  }
+  Rgb transmittance(1.f);
+  const auto visit = [&](const TentativeCollision& c) {
+    if (medium.grey)
+      transmittance *= 1 - c.ratio(medium);
+    else
+      transmittance *= Rgb(1.f) - medium.spectrum * c.ratios(medium);
+    const float largest = maxComponent(transmittance);
+    if (largest >= kTransmittanceRoulette) return true;
+    const bool survives = random.next() * kTransmittanceRoulette < largest;
+    transmittance *= survives ? kTransmittanceRoulette / largest : 0;
     return survives;
-  });
+  };
+  forEachTentativeCollision(medium, medium.sigmaT, ray, t0, t1, random, visit, IgnoreLength{});
   return transmittance;
 }
 

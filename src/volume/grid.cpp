@@ -240,6 +240,13 @@ RgbGrid::RgbGrid(int nx, int ny, int nz, std::vector<Rgb> values)
   checkBox(nx, ny, nz, 3, &values_.front().r).require();
 }
 
+std::shared_ptr<const Grid> RgbGrid::largestChannel() const {
+  std::vector<float> largest;
+  largest.reserve(values_.size());
+  for (Rgb value : values_) largest.push_back(maxComponent(value));
+  return Grid::dense(nx_, ny_, nz_, std::move(largest));
+}
+
 float RgbGrid::maximum() const {
   float best = 0;
   for (Rgb value : values_) best = std::max(best, maxComponent(value));

@@ -60,6 +60,8 @@ class RgbGrid {
   RgbGrid(int nx, int ny, int nz, std::vector<Rgb> values);
   RgbGridView view() const { return {values_.data(), nx_, ny_, nz_}; }
   float maximum() const;  ///< over voxels and channels
+  /// The largest channel of each voxel: its interpolant bounds those of the channels.
+  std::shared_ptr<const Grid> largestChannel() const;
 
  private:
   int nx_, ny_, nz_;

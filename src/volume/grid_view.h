@@ -8,8 +8,6 @@
 
 namespace virga {
 
-VIRGA_HD constexpr Rgb lerp(Rgb a, Rgb b, float t) { return a + (b - a) * t; }
-
 /// Values on a regular box of voxels. Index coordinates put voxel (i, j, k)'s *centre* at (i, j, k).
 template <class T>
 struct BoxView {

@@ -89,6 +89,17 @@ bool isVol(const AlignedBytes& bytes) {
   return bytes.size() >= sizeof(kMagic) && std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) == 0;
 }
 
+int volChannels(std::istream& in) {
+  struct Header {
+    char magic[3];
+    uint8_t version;
+    int32_t type, dimensions[3], channels;
+  } header{};
+  static_assert(sizeof(Header) == 24);
+  in.read(reinterpret_cast<char*>(&header), sizeof header);
+  return in && std::memcmp(header.magic, kMagic, sizeof kMagic) == 0 ? header.channels : 0;
+}
+
 VolFile parseVol(const AlignedBytes& bytes) {
   ByteReader in(bytes.data(), bytes.size(), sizeof(kMagic));
   const int version = in.read<uint8_t>();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <istream>
+
 #include "volume/file_bytes.h"
 #include "volume/volume_io.h"
 
@@ -20,6 +22,8 @@ struct VolFile {
 void requireSoundBox(const VolFile&);
 
 bool isVol(const AlignedBytes& bytes);
+/// Number of channels that the header of a stream speaks of; 0 if it is no `.vol`.
+int volChannels(std::istream& in);
 VolFile parseVol(const AlignedBytes& bytes);
 
 std::shared_ptr<const Grid> loadVol(const AlignedBytes& bytes, const VolumeRequest& request,

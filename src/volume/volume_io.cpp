@@ -78,6 +78,11 @@ RgbGrid loadRgbVolume(const std::filesystem::path& path) {
   });
 }
 
+bool holdsColors(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return volChannels(in) == 3;
+}
+
 Bounds volBounds(const std::filesystem::path& path) {
   return withFile(path, [&](const AlignedBytes& bytes) {
     if (!isVol(bytes)) throw Error("is not a .vol file; others carry a transform, not a box");

@@ -33,6 +33,9 @@ std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const 
 /// A `.vol` of three channels, or of one, which becomes grey.
 RgbGrid loadRgbVolume(const std::filesystem::path& path);
 
+/// A `.vol` of three channels. False for all else, also for what cannot be read.
+bool holdsColors(const std::filesystem::path& path);
+
 /// The box that a `.vol` says it covers; what Mitsuba's `use_grid_bbox` asks for. A box without
 /// volume, and other formats: an Error.
 Bounds volBounds(const std::filesystem::path& path);

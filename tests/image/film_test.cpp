@@ -263,5 +263,33 @@ TEST(Film, EstimatedErrorIsTheRealOne) {
   EXPECT_LT(ratio(0.1f), 0.8) << "an error that all replicates share cannot show, or the test cannot fail";
 }
 
+// A rare bright sample must not hide in the mean that it has raised itself.
+TEST(Film, EstimatedErrorOfFirefliesIsTheRealOne) {
+  Film film(512, 256, LayerMask::none());
+  std::mt19937 random(18);
+  constexpr double kLevel = 0.5, kRarity = 0.01;
+  std::bernoulli_distribution bright(kRarity);
+  std::normal_distribution<float> normal;
+  for (int pass = 0; pass < 2 * Film::kReplicates; ++pass) {
+    for (int y = 0; y < film.height(); ++y)
+      for (int x = 0; x < film.width(); ++x) {
+        LayerRadiance radiance;
+        const float firefly = bright(random) ? static_cast<float>(0.5 * kLevel / kRarity) : 0;
+        radiance.value[4] = Rgb(static_cast<float>(0.5 * kLevel) + 0.1f * normal(random) + firefly);
+        film.frame().set(x, y, radiance);
+      }
+    film.average(pass % Film::kReplicates);
+  }
+  double error = 0;
+  for (const Rgb& p : film.beauty().pixels) {
+    const double d = static_cast<double>(p.g) - kLevel;
+    error += d * d / (kLevel * kLevel + 0.01);
+  }
+  error /= 512 * 256;
+  // The true level is not to be had from 16 samples of such noise: 0.25 at most pixels. Better twice too high than low.
+  EXPECT_GT(*film.estimatedRelMse(), 0.9 * error);
+  EXPECT_LT(*film.estimatedRelMse(), 3.5 * error);
+}
+
 }  // namespace
 }  // namespace virga

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // White furnace: with albedo 1, reflectance 1 and a constant environment of 1, radiance is 1 everywhere.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "methods/rendering.h"
@@ -53,6 +54,19 @@ TEST(Furnace, TableIsWhite) {
 TEST(Furnace, BlendIsWhite) {
   expectWhite(cloudOf(R"(<phase type="blendphase"><float name="weight" value="0.3"/><phase type="hg"/>
     <phase type="cornette_shanks"><float name="g" value="-0.5"/></phase></phase>)"));
+}
+// Hundreds of events a path: Russian roulette must not make up weights where nothing is absorbed.
+TEST(Furnace, ThickMediumIsWhite) {
+  for (const char* sigmaT : {"25", "100"}) {
+    const stats::Moments m = furnace(
+        fmt::format(
+            R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="{}"/>
+        <float name="albedo" value="1"/></medium></shape>)",
+            sigmaT),
+        32);
+    EXPECT_NEAR(m.mean(), 1, 4 * m.standardError()) << sigmaT;
+    EXPECT_LT(m.standardError(), 6e-3) << "a tail of large weights";
+  }
 }
 TEST(Furnace, DiffuseObjectsAreWhite) {
   expectWhite(R"(<shape type="sphere"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></shape>

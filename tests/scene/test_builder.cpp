@@ -145,8 +145,7 @@ TEST(Builder, ValuesOutOfRange) {
   expectError(inMedium("<float name=\"albedo\" value=\"[[1.01]]\"/>"), "\"albedo\" is 1.01; it must be in [0, 1]");
   expectError(inMedium("<rgb name=\"albedo\" value=\"[[0.5, 2, 0.5]]\"/>"), "\"albedo\" is 2; it must be in [0, 1]");
   expectError(inMedium("<float name=\"sigma_t\" value=\"[[-1]]\"/>"), "\"sigma_t\" is -1; it must be at least 0");
-  expectError(inMedium("<rgb name=\"sigma_t\" value=\"[[1, 2, 3]]\"/>"),
-              "\"sigma_t\" differs between the channels; chromatic extinction is not supported yet", "give one value");
+  expectError(inMedium("<rgb name=\"emission\" value=\"[[1, -2, 3]]\"/>"), "\"emission\" is -2; it must be at least 0");
   for (const char* g : {"1", "-1", "1.5"})
     expectError(inMedium(fmt::format("<phase type=\"hg\"><float name=\"g\" value=\"[[{}]]\"/></phase>", g)),
                 fmt::format("\"g\" is {}; it must be in (-1, 1)", g));
@@ -283,7 +282,7 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
 
 TEST(Builder, WhatMakesAPictureBlackIsWarnedOf) {
   EXPECT_EQ(test::build("<shape type=\"sphere\"/>")->warnings,
-            std::vector<std::string>{"warning: the scene has no emitter that shines: its picture is black"});
+            std::vector<std::string>{"warning: nothing in the scene shines: its picture is black"});
   EXPECT_EQ(test::build("<emitter type=\"point\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")
                 ->warnings.size(),
             1u);

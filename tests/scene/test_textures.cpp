@@ -287,12 +287,12 @@ TEST(Textures, BadFilesAndParametersAreNamed) {
               "\"color0\" is 2; it must be in [0, 1]");
   expectError(pictures, "<emitter type=\"point\"><[[texture]] name=\"intensity\" type=\"checkerboard\"/></emitter>",
               "\"intensity\" cannot be a texture", "give an rgb value");
-  expectError(
-      pictures,
-      "<shape type=\"cube\"><bsdf type=\"[[phong]]\"><texture name=\"diffuse_reflectance\" type=\"checkerboard\">"
-      "<float name=\"color0\" value=\"0.9\"/></texture></bsdf></shape>",
-      "diffuse and specular reflectance add up to more than 1",
-      "the largest values of textures count, wherever they lie");
+  expectError(pictures,
+              "<shape type=\"cube\"><bsdf type=\"phong\"><float name=\"specular_reflectance\" "
+              "value=\"[[0.2]]\"/><texture name=\"diffuse_reflectance\" type=\"checkerboard\">"
+              "<float name=\"color0\" value=\"0.9\"/></texture></bsdf></shape>",
+              "diffuse and specular reflectance add up to more than 1",
+              "the largest values of textures count, wherever they lie");
   pictures.folder.write("broken.png", "\x89PNG\r\n\x1a\nand no more");
   const loading::Marked text("<scene version=\"3.0.0\">\n" + painted("[[broken.png]]") + test::kSensor + "</scene>");
   const auto error =

@@ -148,7 +148,7 @@ TEST(EquiangularSegment, EstimatesTheIntegralOfTheInverseSquare) {
 
 TEST(EquiangularSegment, FreeFlightIsExponential) {
   const EquiangularSegment s{.medium = 0, .ray = {{}, {0, 0, 1}}, .t0 = 2, .t1 = kInfinity, .sigmaT = 0.5f};
-  EXPECT_FLOAT_EQ(s.transmittanceTo(4), std::exp(-1.f));
+  EXPECT_FLOAT_EQ(s.flight(4).g, 0.5f * std::exp(-1.f));
   EXPECT_FLOAT_EQ(s.freeFlightPdf(4), 0.5f * std::exp(-1.f));
   EXPECT_TRUE(s.contains(2) && s.contains(1e30f));
   EXPECT_FALSE(s.contains(1.9f));

@@ -8,7 +8,9 @@ namespace virga {
 inline constexpr SettingInfo kPathSettings[] = {
     {"max_depth", "the scene's", "longest path in segments, -1 for no limit; 2 is direct light"},
     {"rr_depth", "the scene's", "scattering events before Russian roulette by throughput begins"},
-    {"equiangular_depth", "1", "segments on which equiangular sampling in homogeneous media aims at large lights, too"},
+    {"equiangular_depth", "1",
+     "segments on which equiangular sampling in homogeneous media aims at all lights, not at small and near ones "
+     "alone"},
 };
 
 /// Unidirectional volumetric path tracing: the reference that every other method is held against.

@@ -10,15 +10,16 @@
 namespace virga {
 
 struct PathOptions {
-  int maxDepth = -1;         ///< segments; -1: no limit
-  int rrDepth = 5;           ///< scattering events before Russian roulette
-  int equiangularDepth = 1;  ///< segments on which technique B aims at large lights, too; at small ones it always does
+  int maxDepth = -1;  ///< segments; -1: no limit
+  int rrDepth = 5;    ///< scattering events before Russian roulette
+  int equiangularDepth =
+      1;  ///< segments on which technique B aims at all lights; at small ones and those in thin fog it always does
 };
 
 /// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
 ///
 /// Techniques for the light at a medium vertex, weighted against each other by the power heuristic:
-///   A  free flight to the vertex, then a point on a light;
+///   A  free flight to the vertex, then a point on a light (not at lights in thin fog: there B is better alone);
 ///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite
 ///   distance); C  free flight to the vertex, then the phase function, which meets the light.
 /// At a surface vertex: A' a point on a light, C' the BSDF.
@@ -26,7 +27,7 @@ template <class Rays>
 class PathTracer {
  public:
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
-      : scene_(scene), rays_(rays), options_(options), hasSmallLights_(hasSmallLights(scene)) {}
+      : scene_(scene), rays_(rays), options_(options), aims_(hasLightsToAimAt(scene)) {}
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler) const {
@@ -69,13 +70,17 @@ class PathTracer {
     Vec3 normal;  ///< geometric, on the frame's side
 
     /// Shading and true normal disagree about which side a direction is on: light would leak through the surface.
-    VIRGA_HD bool leaks(Vec3 world, Vec3 local) const { return dot(world, normal) * local.z <= 0; }
+    /// Mirrors and glass go by the shading normal alone, or their outlines would be dark.
+    VIRGA_HD bool leaks(Vec3 world, Vec3 local) const { return !bsdf->specular() && dot(world, normal) * local.z <= 0; }
   };
 
   /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
   static constexpr int kStratifiedBounces = 4;
-  /// Ends paths in closed white furnaces.
-  static constexpr float kMaxSurvival = 0.98f;
+  /// Survival where nothing absorbs: it ends paths in closed white furnaces and in white fog without end, where else
+  /// they would go on for ever. n events survive with probability about (1 + n / 1000)^-2, so that weights grow as a
+  /// power of n, not exponentially: with a constant 0.98 they grew faster than paths left white media of 13 mean free
+  /// paths or more.
+  VIRGA_HD static float mostSurvival(int depth) { return 1 - 2 / (1000 + static_cast<float>(depth)); }
 
   VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
     return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
@@ -99,34 +104,47 @@ class PathTracer {
     MediaState segmentMedia;
     EquiangularSegment segment;
     Collision collision;
+    SpectralFlight spectral(path.throughput, scene_.chromatic ? one(path, sampler) : 0.f);
+    Rgb glow;
     bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
       if (walk.media.vacuum()) return true;
       if (std::exchange(first, false)) {
-        segment = equiangularSegment(walk, t0, t1, path.depth < options_.equiangularDepth);
+        segment = equiangularSegment(path, walk, t0, t1);
         if (segment.active()) segmentMedia = walk.media;
       }
-      collision = sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      collision = scene_.chromatic ? sampleCollision(scene_, walk, t0, t1, sampler.stream(), spectral)
+                                   : sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      // What glows before a free flight's end counts in full: in expectation that is the transmittance.
+      if (scene_.emissive) glow += estimateEmission(scene_, walk, t0, std::min(t1, collision.t), sampler.stream());
       return !collision.found();
     });
     if (segment.active() && mayScatter(path)) connectEquiangular(path, segment, segmentMedia, sampler);
+    if (scene_.chromatic) path.throughput *= spectral.weight(path.throughput);
+    if (scene_.emissive) path.add(path.layers, glow);
     if (collision.found()) return scatterInMedium(path, walk.media, collision, segment, sampler);
     if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
     addEnvironment(path);
     return false;
   }
 
-  VIRGA_HD EquiangularSegment equiangularSegment(const MediaRay& r, float t0, float t1, bool largeLights) const {
-    if (r.media.count() != 1 || !(largeLights || hasSmallLights_)) return {};
+  VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
+    const bool largeLights = path.depth < options_.equiangularDepth;
+    if (r.media.count() != 1 || !(largeLights || aims_)) return {};
     const int index = r.media.medium(0);
     const MediumView& medium = scene_.media[index];
     if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
-    return {index, largeLights, r.ray, t0, t1, medium.sigmaT};
+    const Rgb choice = path.throughput / (path.throughput.r + path.throughput.g + path.throughput.b);
+    return {index, largeLights, r.ray, t0, t1, medium.sigmaT, medium.grey, medium.spectrum, choice};
   }
-  VIRGA_HD static bool hasSmallLights(const SceneView& scene) {
+  /// Are there lights that technique B aims at on every segment?
+  VIRGA_HD static bool hasLightsToAimAt(const SceneView& scene) {
     for (const EmitterView& e : scene.emitters)
-      for (const MediumView& m : scene.media)
-        if (m.homogeneous && e.isLocal() && e.area * square(m.sigmaT) < EquiangularSegment::kSmallLight) return true;
+      for (int m = 0; m < scene.media.size; ++m) {
+        const MediumView& medium = scene.media[m];
+        const bool isSmall = e.area * square(medium.sigmaT) < EquiangularSegment::kSmallLight;
+        if (medium.homogeneous && e.isLocal() && (isSmall || e.medium == m)) return true;
+      }
     return false;
   }
 
@@ -154,7 +172,7 @@ class PathTracer {
         const float flight = last.segment.freeFlightPdf(last.t);
         const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
         const float equiangular = choice * uniform * last.segment.pdf(point.p, last.t);
-        w = weight(flight * last.pdf, flight * connection, equiangular);
+        w = weight(flight * last.pdf, last.segment.replacesFlights(emitter) ? 0 : flight * connection, equiangular);
       } else {
         w = weight(last.pdf, connection);
       }
@@ -167,17 +185,17 @@ class PathTracer {
   /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way.
   /// `r` starts at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it
   /// is expected to.
-  VIRGA_HD float visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
+  VIRGA_HD Rgb visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
     float tMax = kInfinity;
     if (!std::isinf(light.distance)) {
       const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
       const float d = length(toLight);
       // Stop short of the light's own surface: beyond the errors of both ends, whose coordinates may be large.
       tMax = d * (1 - 10 * kHitError) - kHitError * std::max(0.5f * maxComponent(abs(r.ray.o)), 5e-2f * scene_.scale);
-      if (tMax <= 0) return 1;
+      if (tMax <= 0) return Rgb(1.f);
       r.ray.d = toLight / d;
     }
-    if (rays_.occluded(r.ray, tMax)) return 0;
+    if (rays_.occluded(r.ray, tMax)) return {};
     return transmittance(scene_, rays_, r, tMax, sampler.stream());
   }
 
@@ -187,10 +205,12 @@ class PathTracer {
     float choice = 0;  ///< probability of the emitter
   };
 
+  /// Nothing for lights that technique B finds by itself on the segment to x.
   VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, Sampler& sampler) const {
     const auto choice = scene_.emitterChoice.sample(one(path, sampler));
-    const Vec2 u = pair(path, sampler);
-    return {sampleLight(scene_, scene_.emitters[choice.index], x, u), choice.index, choice.probability};
+    const EmitterView& emitter = scene_.emitters[choice.index];
+    if (path.last.segment.replacesFlights(emitter)) return {};
+    return {sampleLight(scene_, emitter, x, pair(path, sampler)), choice.index, choice.probability};
   }
 
   VIRGA_HD bool hasLights() const {
@@ -217,18 +237,20 @@ class PathTracer {
     const PhaseFunction phase = medium.phaseAt(x);
     const float flight = segment.freeFlightPdf(distance.t);
     const float own = choice.probability * distance.pdf * light.pdf;
+    const float connected = segment.replacesFlights(emitter) ? 0 : flight * choice.probability;
     float w = 1;
     if (light.delta) {
-      w = weight(own, flight * choice.probability);
+      w = weight(own, connected);
     } else {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
-      w = weight(own, flight * choice.probability * connection, flight * phase.pdf(wo, light.wi));
+      w = weight(own, connected * connection, flight * phase.pdf(wo, light.wi));
     }
-    const float seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
+    const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
     layers.scatter(LayerPath::Vertex::medium);
-    // sigma_s tau = albedo * flight
-    path.add(layers, medium.albedoAt(x) * light.radiance * (flight * phase.value(wo, light.wi) * seen * w / own));
+    // sigma_s tau = albedo * sigma_t tau
+    const Rgb scattered = medium.albedoAt(x) * segment.flight(distance.t) * light.radiance;
+    path.add(layers, scattered * seen * (phase.value(wo, light.wi) * w / own));
   }
 
   /// Technique A at a medium vertex.
@@ -247,14 +269,15 @@ class PathTracer {
       const float flight = segment.freeFlightPdf(path.last.t);
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
-    const float seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
-    if (seen > 0) path.add(path.layers, c.light.radiance * (phase.value(wo, c.light.wi) * seen * w / own));
+    const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
+    path.add(path.layers, c.light.radiance * seen * (phase.value(wo, c.light.wi) * w / own));
   }
 
   /// Technique A' at a surface vertex.
   VIRGA_HD void connectSurface(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
                                Sampler& sampler) const {
     if (!hasLights()) return;
+    path.last.segment = {};
     const Connection c = sampleConnection(path, point.p, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const Vec3 wi = side.frame.toLocal(c.light.wi);
@@ -263,8 +286,8 @@ class PathTracer {
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
     const MediaRay leaving = leaveSurface(point, -path.at.ray.d, c.light.wi, media);
-    const float seen = visibility(leaving, point.p, c.light, sampler);
-    if (seen > 0) path.add(path.layers, value * c.light.radiance * (std::fabs(wi.z) * seen * w / own));
+    const Rgb seen = visibility(leaving, point.p, c.light, sampler);
+    path.add(path.layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
   }
 
   // --- vertices ---
@@ -350,8 +373,7 @@ class PathTracer {
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
     if (path.depth < options_.rrDepth) return true;
-    // A copy of the constant: std::min wants a reference, and device code has none to it.
-    const float q = std::min(maxComponent(path.throughput) * path.etaScale, float{kMaxSurvival});
+    const float q = std::min(maxComponent(path.throughput) * path.etaScale, mostSurvival(path.depth));
     if (!(sampler.random() < q)) return false;
     path.throughput *= 1 / q;
     return true;
@@ -360,7 +382,7 @@ class PathTracer {
   const SceneView& scene_;
   const Rays& rays_;
   const PathOptions& options_;
-  bool hasSmallLights_;
+  bool aims_;
 };
 
 }  // namespace virga
