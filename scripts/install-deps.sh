@@ -10,7 +10,7 @@ packages=(
   libopenexr-dev libimath-dev libstb-dev
   libpugixml-dev
   libcli11-dev libfmt-dev nlohmann-json3-dev
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libbenchmark-dev clang-format
 )
 
 is_installed() {

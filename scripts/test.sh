@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Installs what is missing, builds, and runs every test: all of them in the release build (whose own assertions stay on),
+# Installs what is missing, checks the layout of the code, builds, and runs every test: all of them in the release build (whose own assertions stay on),
 # then all but the slow ones (rendering until statistics tell) under AddressSanitizer and UndefinedBehaviorSanitizer.
 # Fails at the first step that fails; the last lines are the test runner's summary.
 set -euo pipefail
@@ -10,6 +10,9 @@ jobs=$(nproc)
 
 echo "== packages"
 scripts/install-deps.sh
+
+echo "== layout"
+git ls-files '*.h' '*.cpp' | xargs clang-format --dry-run -Werror
 
 echo "== release build"
 scripts/build.sh release

@@ -265,8 +265,8 @@ void warnIfOpen(PluginReader& reader, const MediumTransition& media, const Built
     return;
   const Node& node = reader.node();
   reader.diagnostics().warn(
-      Error(fmt::format("the {}{} holds a medium and is open: {} of its edges have no neighbour that agrees, and the "
-                        "medium leaks out",
+      Error(fmt::format("the {}{} holds a medium and is open: {} of its edges have no neighbour that agrees, and light "
+                        "that passes beside it takes the wrong medium along",
                         node.type, node.hasGeneratedId() ? "" : fmt::format(" \"{}\"", node.id), shape.openEdges),
             {node.typePosition.known() ? node.typePosition : node.position, "close it", {}}));
 }
@@ -280,8 +280,10 @@ int defaultBsdf(BuildContext& context, bool emits) {
 }
 
 void addBoundary(BuildContext& context, MediumTransition media, std::shared_ptr<const BuiltShape> shape) {
-  media.replaces = media.exterior != MediumTransition::kNone;
-  if (!media.declared()) return;  // nothing on either side: the shape is invisible
+  if (media.interior == MediumTransition::kNone && media.exterior == MediumTransition::kNone) return;  // invisible
+  // Only closed shapes can add: of an open one nobody knows whether a point lies in it. Two sheets bound a slab.
+  media.closed = shape->openEdges == 0;
+  media.replaces = media.exterior != MediumTransition::kNone || !media.closed;
   context.parts.boundaries.push_back(media);
   context.parts.boundaryShapes.push_back(std::move(shape));
 }

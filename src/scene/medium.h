@@ -50,6 +50,7 @@ struct MediumTransition {
   static constexpr int kNone = -1;
   int interior = kNone, exterior = kNone;
   bool replaces = false;  ///< the declared side takes the place of all that was there; otherwise the interior is added
+  bool closed = true;     ///< it has an inside
 
   VIRGA_HD bool declared() const { return replaces || interior != kNone; }
 };

@@ -109,7 +109,7 @@ Surroundings enclosingSurface(const SceneView& view, const RayScene& surfaces, c
 
 MediaState mediaAt(const Scene& scene, Vec3 p) {
   // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those
-  // that replace, the nearest is the innermost.
+  // that replace, the nearest is the innermost. Open ones are taken for one: the nearest of them decides.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
   Surroundings base = enclosingSurface(scene.view, *scene.surfaceRays, ray);
   std::vector<Crossing> around;
@@ -119,8 +119,9 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
     scene.boundaryRays->crossings(ray, from, kInfinity, list);
     for (int i = 0; i < list.count; ++i) {
       const Crossing& c = list.items[i];
-      if (!seen.insert(c.shape).second) continue;
       const MediumTransition& media = scene.view.boundaries[c.shape];
+      constexpr uint32_t kAllOpen = ~0u;
+      if (!seen.insert(media.closed ? c.shape : kAllOpen).second) continue;
       if (c.entering) continue;
       if (!media.replaces) around.push_back(c);
       if (media.replaces && c.t < base.t) base = {c.t, media.interior};

@@ -69,7 +69,7 @@ VIRGA_HD void applyPlace(const SceneView& scene, const Rays& rays, const Crossin
     Crossing c = crossings[i];
     bool doubtful = c.doubtful;
     for (int j = 0; j < count; ++j) doubtful |= crossings[j].shape == c.shape && crossings[j].entering != c.entering;
-    if (doubtful) c.entering = insideBoundary(rays, c.shape, behind);
+    if (doubtful && scene.boundaries[c.shape].closed) c.entering = insideBoundary(rays, c.shape, behind);
     applyCrossing(scene, c, media);
   }
 }

@@ -41,10 +41,10 @@ Image picture(const std::string& elements, uint64_t seed, int passes = 512) {
   return rendered(sceneOf(elements, ::testing::TempDir()), {.passes = passes, .seed = seed}).film().beauty();
 }
 
-void expectSame(const std::string& a, const std::string& b) {
-  Agreement result = agreement(picture(a, 1), picture(b, 2));
+void expectSame(const std::string& a, const std::string& b, int passes = 512) {
+  Agreement result = agreement(picture(a, 1, passes), picture(b, 2, passes));
   // By chance one pair in a hundred misses by 3 of four quarters: an independent second look tells.
-  if (result.worstZ > 3) result = agreement(picture(a, 3, 2048), picture(b, 4, 2048));
+  if (result.worstZ > 3) result = agreement(picture(a, 3, 4 * passes), picture(b, 4, 4 * passes));
   EXPECT_LT(result.worstZ, 3.2);
   EXPECT_LT(result.precision, 0.006) << "too few samples to tell";
 }
@@ -124,7 +124,8 @@ TEST(Equivalence, CameraInsideIsCameraOutsideWithTheBoundaryMoved) {
     <emitter type="area"><rgb name="radiance" value="60"/></emitter></shape>)";
   expectSame(sensor(near) + lamp + kGround + around,
              fog + sensor(near + R"(<ref name="medium" id="fog"/>)") + lamp + kGround +
-                 box(R"(<ref name="interior" id="fog"/>)", R"(<scale value="9"/>)"));
+                 box(R"(<ref name="interior" id="fog"/>)", R"(<scale value="9"/>)"),
+             768);
 }
 
 TEST(Equivalence, NestedIsFlattened) {

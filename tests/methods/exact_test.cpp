@@ -145,6 +145,27 @@ TEST(Airlight, SingleScatteringAgreesWithQuadrature) {
     }
 }
 
+// Sheets are not closed: each one that is passed says which medium follows.
+TEST(Exact, TwoSheetsBoundASlab) {
+  const std::string medium = R"(<medium type="homogeneous" id="s"><float name="sigma_t" value="0.5"/>
+    <float name="albedo" value="0"/></medium>)";
+  const auto sheet = [](const char* transform) {
+    return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><scale value="10"/>{}</transform>
+      <bsdf type="null"/><ref id="s" name="interior"/></shape>)",
+                       transform);
+  };
+  const std::string sheets = medium + sheet(R"(<translate z="1"/>)") +
+                             sheet(R"(<rotate x="1" angle="180"/><translate z="-1"/>)") +
+                             R"(<emitter type="constant"/>)";
+  for (const char* eye : {"0, 0, 5", "0, 0, -5"}) {
+    const RenderSession session =
+        rendered(sceneOf(pinpointSensor(eye, "0, 0, 0", "0, 1, 0", 16) + sheets), {.passes = 256});
+    const stats::Moments m = pixelMoments(session.film().beauty());
+    EXPECT_NEAR(m.mean(), std::exp(-1.0), 4 * m.standardError()) << eye;
+    EXPECT_LT(m.standardError(), 4e-3);
+  }
+}
+
 // A sphere of radiance L that is wholly above the horizon sends the irradiance pi L (r / d)^2 cos(theta), however near
 // it is and wherever the coordinates have their origin.
 TEST(Exact, SphereLightOverAFloor) {

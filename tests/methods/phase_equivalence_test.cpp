@@ -2,6 +2,7 @@
 // The same phase function said in different ways makes the same picture.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -72,7 +73,8 @@ TEST(PhaseEquivalence, AnotherPhaseFunctionIsNoticed) {
 }
 
 TEST(PhaseEquivalence, AGridOfOneWeightIsThatWeight) {
-  const std::filesystem::path file = std::filesystem::temp_directory_path() / "virga_phase_equivalence.vol";
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("virga_phase_equivalence." + std::to_string(::getpid()) + ".vol");
   DenseVolume volume;
   volume.nx = volume.ny = volume.nz = 2;
   volume.values.assign(8, 0.25f);

@@ -2,6 +2,7 @@
 // Values at the ends of their ranges and places that lie exactly on something.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -116,7 +117,8 @@ class Grids : public ::testing::Test {
                               scale, file_.string()),
                   "heterogeneous");
   }
-  const std::filesystem::path file_ = std::filesystem::temp_directory_path() / "virga_robustness.vol";
+  const std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("virga_robustness." + std::to_string(::getpid()) + ".vol");
 };
 
 TEST_F(Grids, WithoutDensityAreInvisible) {
@@ -177,7 +179,8 @@ class Meshes : public ::testing::Test {
     std::ofstream(file_) << text;
     return fmt::format(R"(<shape type="obj"><string name="filename" value="{}"/>{}</shape>)", file_.string(), inside);
   }
-  const std::filesystem::path file_ = std::filesystem::temp_directory_path() / "virga_robustness.obj";
+  const std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("virga_robustness." + std::to_string(::getpid()) + ".obj");
 
   static constexpr const char* kCube =
       "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n";

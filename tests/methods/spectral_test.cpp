@@ -44,9 +44,10 @@ std::string homogeneous(const Coefficients& sigmaT, int channel) {
                      colour(sigmaT, channel), colour({0.95, 0.8, 0.99}, channel));
 }
 
-// Three channels of 4^3 voxels, or one of them, in a file.
+// Three channels of 4^3 voxels, or one of them, in a file. Its name is the test's own: they run side by side.
 std::string grid(int channel) {
-  const std::string name = fmt::format("colours{}.vol", channel);
+  const char* test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
+  const std::string name = fmt::format("colours-{}{}.vol", test, channel);
   std::ofstream out(::testing::TempDir() + "/" + name, std::ios::binary);
   const auto put = [&](auto value) { out.write(reinterpret_cast<const char*>(&value), sizeof value); };
   out.write("VOL\3", 4);

@@ -177,14 +177,15 @@ std::string colored(const char* name, Rgb c) {
 }
 constexpr const char* kNearest = R"(<string name="filter_type" value="nearest"/>)";
 
-void writeMosaic(float scale) {
+// Under a name of its own for each test: they run side by side.
+void writeMosaic(const std::string& name, float scale) {
   Image image(2, 2);
   for (size_t i = 0; i < 4; ++i) image.pixels[i] = kColors[i] * scale;
-  write("mosaic.exr", image);
+  write(name.c_str(), image);
 }
 
 TEST(Surfaces, ATexturedLightIsAMosaicOfPlainOnes) {
-  writeMosaic(1);
+  writeMosaic("mosaic-light.exr", 1);
   const auto light = [](const std::string& radiance) { return R"(<emitter type="area">)" + radiance + "</emitter>"; };
   const std::string pieces = fourPieces([&](Rgb c) { return light(colored("radiance", c)); });
   const std::string fog =
@@ -192,18 +193,18 @@ TEST(Surfaces, ATexturedLightIsAMosaicOfPlainOnes) {
     <translate y="-0.6" z="0.5"/></transform>{}</shape>)",
                   kFog);
   for (const std::string& world : {std::string(kGround), kGround + fog}) {
-    expectSame(world + pieces, world + mosaic(light(bitmap("radiance", "mosaic.exr", kNearest)), ""));
+    expectSame(world + pieces, world + mosaic(light(bitmap("radiance", "mosaic-light.exr", kNearest)), ""));
   }
 }
 
 TEST(Surfaces, ATexturedWallIsAMosaicOfPlainOnes) {
-  writeMosaic(0.1f);
+  writeMosaic("mosaic-wall.exr", 0.1f);
   const auto wall = [](const std::string& reflectance) {
     return R"(<bsdf type="twosided"><bsdf type="diffuse">)" + reflectance + "</bsdf></bsdf>";
   };
   const std::string pieces = fourPieces([&](Rgb c) { return wall(colored("reflectance", c * 0.1f)); });
   const std::string world = std::string(kGround) + kLamp + kSky;
-  expectSame(world + pieces, world + mosaic(wall(bitmap("reflectance", "mosaic.exr", kNearest)), ""));
+  expectSame(world + pieces, world + mosaic(wall(bitmap("reflectance", "mosaic-wall.exr", kNearest)), ""));
 }
 
 // --- Cylinder
