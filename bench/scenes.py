@@ -47,7 +47,8 @@ def parse_arguments():
     parser.add_argument("--method", default="path", help="Virga's method (default path)")
     parser.add_argument("--reference-error", type=float, metavar="E",
                         help="relMSE to render references to (default: the scene's row; coarser is quicker and less exact)")
-    parser.add_argument("--mitsuba", nargs="?", const="llvm_ad_rgb,scalar_rgb", metavar="VARIANTS",
+    parser.add_argument("--page", metavar="FILE.md", help="also write the table as a page, as docs/results/speed.md is made")
+    parser.add_argument("--mitsuba", nargs="?", const="scalar_rgb", metavar="VARIANTS",
                         help="also run Mitsuba 3 (pip install mitsuba) on the same files; variants, comma separated")
     options = parser.parse_args()
     if not options.scenes:
@@ -189,6 +190,28 @@ def print_table(rows):
               f"{r['k']:9.4f}")
 
 
+PAGE = """# Speed
+
+Written by `scripts/bench.sh --page docs/results/speed.md`, {threads} threads, {size} x {size} pixels, median of {runs} runs. k = seconds x relMSE is a constant of an
+unbiased renderer on a scene: lower is better, and k / relMSE is the time that it needs. Seconds are (user + system) / threads of the whole process;
+relMSE is against a converged picture of another seed, whose own error is subtracted. Only ratios within one table mean anything.
+
+| renderer | scene | samples a pixel | seconds | relMSE | bias | k |
+| --- | --- | --- | --- | --- | --- | --- |
+{rows}
+
+The scenes: `smoke`, a plume of 128^3 voxels over a ground, albedo 0.95, under a point light; `smoke-g0.6`, the same with forward scattering; `fog`, a
+closed box of thin fog with a lamp, the camera inside. They are not part of the repository.
+"""
+
+
+def write_page(path, rows, options):
+    lines = [f"| {r['renderer']} | {r['scene']} | {r['spp']} | {r['seconds']:.2f} | {r['relmse']:.2e} | {100 * r['bias']:.2f} % | {r['k']:.4f} |"
+             for r in rows]
+    text = PAGE.format(threads=options.threads, size=options.size, runs=options.runs, rows="\n".join(lines))
+    pathlib.Path(path).write_text(text)
+
+
 def renderers(options):
     found = [(f"virga {options.method}", run_virga)]
     if options.mitsuba:
@@ -223,6 +246,8 @@ def main():
     print_table(rows)
     machine = {"processor": platform.processor() or platform.machine(), "threads": options.threads, "size": options.size}
     (OUT / "results.json").write_text(json.dumps({"machine": machine, "results": rows}, indent=2) + "\n")
+    if options.page:
+        write_page(options.page, rows, options)
     print(f"wrote {(OUT / 'results.json').relative_to(ROOT)}")
 
 

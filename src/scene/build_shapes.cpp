@@ -29,12 +29,12 @@ void measure(BuiltShape& shape) {
 // Takes a mesh in world space.
 void finishMesh(BuiltShape& shape, Role role) {
   TriangleMesh& mesh = shape.mesh;
-  if (role != Role::surface) shape.openEdges = openEdges(mesh);
   // What has no area in single precision has no normal either: no ray and no light shall find it.
   const std::vector<Vec3>& p = mesh.positions;
   std::erase_if(mesh.triangles,
                 [&](const auto& t) { return !(lengthSquared(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])) > 0); });
   if (mesh.triangles.empty()) return;
+  if (role != Role::surface) shape.openEdges = openEdges(mesh);
   mesh.positions.reserve(mesh.positions.size() + 2);  // Embree reads 16 bytes at the last vertex
   shape.view.kind = ShapeView::Kind::mesh;
   shape.view.positions = mesh.positions.data();

@@ -210,8 +210,11 @@ TEST(Surfaces, ATexturedWallIsAMosaicOfPlainOnes) {
 // --- Cylinder
 
 // A tube of 400 flat strips, in a file of the test's own.
-void writeTube(const char* file, bool closed) {
-  FILE* out = std::fopen((std::filesystem::path(::testing::TempDir()) / file).c_str(), "w");
+std::string tubeFile() {
+  return fmt::format("tube-{}.obj", ::testing::UnitTest::GetInstance()->current_test_info()->name());
+}
+void writeTube(bool closed) {
+  FILE* out = std::fopen((std::filesystem::path(::testing::TempDir()) / tubeFile()).c_str(), "w");
   constexpr int kSides = 400;
   for (int i = 0; i < kSides; ++i) {
     const double phi = 2 * 3.14159265358979 * i / kSides;
@@ -237,11 +240,12 @@ std::string tube(const std::string& inside) {
   return fmt::format(R"(<shape type="cylinder">{}{}</shape>)", kPose, inside);
 }
 std::string meshTube(const std::string& inside) {
-  return fmt::format(R"(<shape type="obj"><string name="filename" value="tube.obj"/>{}{}</shape>)", kPose, inside);
+  return fmt::format(R"(<shape type="obj"><string name="filename" value="{}"/>{}{}</shape>)", tubeFile(), kPose,
+                     inside);
 }
 
 TEST(Surfaces, ACylinderIsATubeOfStrips) {
-  writeTube("tube.obj", false);
+  writeTube(false);
   const std::string grey = R"(<bsdf type="twosided"><bsdf type="diffuse"/></bsdf>)",
                     world = std::string(kGround) + kSky;
   expectSame(world + kLamp + tube(grey), world + kLamp + meshTube(grey));
@@ -253,7 +257,7 @@ TEST(Surfaces, ACylinderIsATubeOfStrips) {
 
 // With disks of index one at its ends, a tube bounds a medium as a closed mesh does.
 TEST(Surfaces, AClosedCylinderBoundsAMedium) {
-  writeTube("tube.obj", true);
+  writeTube(true);
   const std::string fog = R"(<medium id="fog" type="homogeneous"><float name="sigma_t" value="1.5"/>
     <rgb name="albedo" value="0.9, 0.7, 0.5"/></medium>)";
   const std::string same = number("int_ior", 1.5) + number("ext_ior", 1.5);
