@@ -140,6 +140,10 @@ class Bsdf {
   VIRGA_HD bool transmits() const {
     return kind_ == Kind::dielectric || kind_ == Kind::thinDielectric || kind_ == Kind::roughDielectric;
   }
+  /// Lets a part of the light go on as if nothing were there: connections look through it.
+  VIRGA_HD bool isThin() const { return kind_ == Kind::thinDielectric; }
+  /// That part; 0 for all others.
+  VIRGA_HD Rgb straight(float cosine) const { return isThin() ? thinDielectric_.straight(cosine) : Rgb(); }
   /// Depends on how the frame lies about the normal.
   VIRGA_HD bool anisotropic() const {
     return dispatch(*this, [](const auto& b) {

@@ -19,6 +19,8 @@ struct ThinDielectric {
     const float r = fresnelDielectric(std::fabs(cosine), eta).reflectance;
     return 2 * r / (1 + r);
   }
+  /// What goes straight through.
+  VIRGA_HD Rgb straight(float cosine) const { return transmittance * (1 - reflectedShare(cosine)); }
   VIRGA_HD BsdfSample sample(Vec3 wo, Vec2, float choice) const {
     const float r = reflectedShare(wo.z);
     if (choice < r) return {Vec3(-wo.x, -wo.y, wo.z), reflectance, r, true, 1};

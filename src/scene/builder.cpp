@@ -35,6 +35,7 @@ void linkViews(Scene& scene, const Scene::Parts& parts) {
   view.media = viewOf(parts.media);
   view.emitters = viewOf(parts.emitters);
   view.emitterChoice = parts.emitterChoice.view();
+  for (const ShapeView& s : parts.surfaces) view.thinGlass |= parts.bsdfs[static_cast<size_t>(s.bsdf)].front.isThin();
   for (const MediumView& m : parts.media) {
     view.chromatic |= !m.grey;
     view.emissive |= m.emits;
@@ -85,7 +86,7 @@ void warnOfDarkness(BuildContext& context) {
       std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
   const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
     const Bsdf& front = parts.bsdfs[static_cast<size_t>(s.bsdf)].front;
-    return front.specular() && front.transmits();
+    return front.specular() && front.transmits() && !front.isThin();
   });
   if (points && glass)
     context.diagnostics.warnings.push_back(

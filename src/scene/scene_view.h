@@ -49,6 +49,7 @@ struct SceneView {
   View<EmitterView> emitters;
   DiscreteView emitterChoice;  ///< by power
   bool chromatic = false;      ///< some medium's extinction differs between the channels
+  bool thinGlass = false;      ///< some surface lets light straight through (Bsdf::isThin)
   bool emissive = false;       ///< some medium emits light
   int environment = -1;        ///< index of the constant or environment emitter, if any
   MediaState cameraMedia;      ///< at the point below, from where camera rays cross boundaries to their own starts

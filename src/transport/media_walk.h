@@ -155,9 +155,10 @@ VIRGA_HD inline Rgb estimateEmission(const SceneView& scene, const MediaRay& r, 
   return sum;
 }
 
-/// Unbiased estimate of the transmittance along [0, tMax], null boundaries passed; surfaces are not looked at.
+/// Unbiased estimate of the transmittance along [0, tMax], null boundaries passed; surfaces are not looked at. Where it
+/// is not 0, `r.media` is what holds at the end.
 template <class Rays>
-VIRGA_HD Rgb transmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, Pcg32& random) {
+VIRGA_HD Rgb passMedia(const SceneView& scene, const Rays& rays, MediaRay& r, float tMax, Pcg32& random) {
   Rgb product(1.f);
   walkMedia(scene, rays, r, tMax, [&](float t0, float t1) {
     for (int i = 0; i < r.media.count() && !isBlack(product); ++i)
@@ -165,6 +166,10 @@ VIRGA_HD Rgb transmittance(const SceneView& scene, const Rays& rays, MediaRay r,
     return !isBlack(product);
   });
   return product;
+}
+template <class Rays>
+VIRGA_HD Rgb transmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, Pcg32& random) {
+  return passMedia(scene, rays, r, tMax, random);
 }
 
 }  // namespace virga

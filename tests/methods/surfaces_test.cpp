@@ -273,5 +273,51 @@ TEST(Surfaces, AClosedCylinderBoundsAMedium) {
              world + tube(pane) + lid(R"(<translate z="1"/>)") + lid(R"(<rotate x="1" angle="180"/>)"));
 }
 
+// A lamp in the middle of a ball of thin glass: its light meets the glass at right angles, and what goes straight on is
+// found by connections. It counts as having passed glass, and the glass is no vertex: depth 2 suffices.
+TEST(Surfaces, ConnectionsLookThroughThinGlass) {
+  constexpr double kEta = 1.5;
+  const auto floorUnder = [](const std::string& around, Layer layer) {
+    const std::string scene = R"(<integrator type="path"><integer name="max_depth" value="2"/></integrator>)" +
+                              pinpointSensor("0, 1, 4", "0, 0, 0", "0, 1, 0", 8) + R"(<shape type="rectangle">
+        <transform name="to_world"><rotate x="1" angle="-90"/></transform></shape><emitter type="point">
+        <point name="position" x="0" y="2" z="0"/></emitter>)" +
+                              around;
+    return pixelMoments(rendered(sceneOf(scene), {.passes = 8, .layers = LayerMask::all()}).film().layer(layer)).mean();
+  };
+  const std::string glass =
+      fmt::format(R"(<shape type="sphere"><point name="center" x="0" y="2" z="0"/><float name="radius" value="0.7"/>
+    <bsdf type="thindielectric"><float name="int_ior" value="{}"/><float name="ext_ior" value="1"/></bsdf></shape>)",
+                  kEta);
+  const double bare = floorUnder("", Layer::directSurface), r = std::pow((kEta - 1) / (kEta + 1), 2);
+  EXPECT_NEAR(floorUnder(glass, Layer::causticSurface), bare * (1 - 2 * r / (1 + r)), 1e-4 * bare);
+  EXPECT_EQ(floorUnder(glass, Layer::directSurface), 0);
+}
+
+// Light that passes the glass by chance and light that is connected to through it share: what a pane takes from a lamp
+// behind it does not depend on how large the lamp is.
+TEST(Surfaces, AWindowTakesTheSameOfLampsOfAnySize) {
+  const auto taken = [](double radius) {
+    const auto mean = [&](const std::string& window) {
+      const std::string scene =
+          pinpointSensor("0.5, 2, 4", "0, 0, 0", "0, 1, 0", 24) + R"(<shape type="rectangle">
+          <transform name="to_world"><rotate x="1" angle="-90"/></transform></shape>)" +
+          fmt::format(R"(<shape type="sphere"><point name="center" x="0" y="20" z="0"/><float name="radius" value="{}"/>
+          <emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>)",
+                      radius, 100 / (radius * radius)) +
+          window;
+      return pixelMoments(rendered(sceneOf(scene), {.passes = 256}).film().beauty());
+    };
+    const stats::Moments open = mean(""),
+                         behind = mean(R"(<shape type="rectangle"><transform name="to_world"><scale value="9"/>
+        <rotate x="1" angle="-90"/><translate y="10"/></transform><bsdf type="thindielectric"><float name="int_ior" value="2"/>
+        <float name="ext_ior" value="1"/></bsdf></shape>)");
+    EXPECT_LT(behind.standardError(), 4e-3 * behind.mean());
+    return behind.mean() / open.mean();
+  };
+  const double r = 1.0 / 9, straight = 1 - 2 * r / (1 + r);
+  for (const double radius : {0.01, 1.0, 3.0}) EXPECT_NEAR(taken(radius), straight, 0.012) << radius;
+}
+
 }  // namespace
 }  // namespace virga

@@ -184,8 +184,8 @@ class PathTracer {
 
   /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way.
   /// `r` starts at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it
-  /// is expected to.
-  VIRGA_HD Rgb visibility(MediaRay r, Vec3 x, const LightSample& light, Sampler& sampler) const {
+  /// is expected to. Light that passes thin glass is noted in `layers`.
+  VIRGA_HD Rgb visibility(MediaRay r, Vec3 x, const LightSample& light, LayerPath& layers, Sampler& sampler) const {
     float tMax = kInfinity;
     if (!std::isinf(light.distance)) {
       const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
@@ -195,8 +195,28 @@ class PathTracer {
       if (tMax <= 0) return Rgb(1.f);
       r.ray.d = toLight / d;
     }
+    if (scene_.thinGlass) return throughThinGlass(r, tMax, layers, sampler);
     if (rays_.occluded(r.ray, tMax)) return {};
     return transmittance(scene_, rays_, r, tMax, sampler.stream());
+  }
+
+  VIRGA_HD Rgb throughThinGlass(MediaRay r, float tMax, LayerPath& layers, Sampler& sampler) const {
+    const Vec3 d = r.ray.d, end = r.ray.at(tMax);
+    Rgb seen(1.f);
+    while (!isBlack(seen)) {
+      const RayHit hit = rays_.nearest(r.ray, tMax);
+      if (!hit.found()) return seen * passMedia(scene_, rays_, r, tMax, sampler.stream());
+      const SurfacePoint point = surfacePoint(scene_.surfaces[hit.shape], r.ray, hit, scene_.scale);
+      Bsdf textured;
+      const Side side = sideOf(point, hit, -d, textured);
+      if (!side.bsdf->isThin()) return {};
+      seen *= passMedia(scene_, rays_, r, hit.t, sampler.stream()) * side.bsdf->straight(side.wo.z);
+      layers.scatterSpecularly();
+      r = leaveSurface(point, -d, d, r.media);
+      if (!std::isinf(tMax)) tMax = dot(end - r.ray.o, d);
+      if (tMax <= 0) return seen;
+    }
+    return seen;
   }
 
   struct Connection {
@@ -245,9 +265,9 @@ class PathTracer {
       const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
       w = weight(own, connected * connection, flight * phase.pdf(wo, light.wi));
     }
-    const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, sampler);
     LayerPath layers = path.layers;
     layers.scatter(LayerPath::Vertex::medium);
+    const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, layers, sampler);
     // sigma_s tau = albedo * sigma_t tau
     const Rgb scattered = medium.albedoAt(x) * segment.flight(distance.t) * light.radiance;
     path.add(layers, scattered * seen * (phase.value(wo, light.wi) * w / own));
@@ -269,8 +289,9 @@ class PathTracer {
       const float flight = segment.freeFlightPdf(path.last.t);
       w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
-    const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, sampler);
-    path.add(path.layers, c.light.radiance * seen * (phase.value(wo, c.light.wi) * w / own));
+    LayerPath layers = path.layers;
+    const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, layers, sampler);
+    path.add(layers, c.light.radiance * seen * (phase.value(wo, c.light.wi) * w / own));
   }
 
   /// Technique A' at a surface vertex.
@@ -286,8 +307,9 @@ class PathTracer {
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
     const MediaRay leaving = leaveSurface(point, -path.at.ray.d, c.light.wi, media);
-    const Rgb seen = visibility(leaving, point.p, c.light, sampler);
-    path.add(path.layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
+    LayerPath layers = path.layers;
+    const Rgb seen = visibility(leaving, point.p, c.light, layers, sampler);
+    path.add(layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
   }
 
   // --- vertices ---
@@ -345,10 +367,17 @@ class PathTracer {
     const ShapeView& shape = scene_.surfaces[hit.shape];
     const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
     if (shape.emitter >= 0) addAreaLight(path, point, hit);
-    if (!mayScatter(path)) return false;
+    if (!mayScatter(path) && !scene_.thinGlass) return false;
     const Vec3 wo = -path.at.ray.d;
     Bsdf textured;
     const Side side = sideOf(point, hit, wo, textured);
+    if (side.bsdf->isThin()) {
+      const BsdfSample s = side.bsdf->sample(side.wo, {}, one(path, sampler));
+      if (s.wi.z * side.wo.z < 0) return passStraight(path, point, s.weight, media, hit.t);
+      path.layers.scatterSpecularly();
+      return mayScatter(path) && leave(path, point, side, s, media, sampler);
+    }
+    if (!mayScatter(path)) return false;
     if (side.leaks(wo, side.wo)) return false;
     const bool specular = side.bsdf->specular();
     if (specular) {
@@ -357,18 +386,34 @@ class PathTracer {
       path.layers.scatter(LayerPath::Vertex::surface);
       connectSurface(path, point, side, media, sampler);
     }
-
     const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    return leave(path, point, side, s, media, sampler);
+  }
+
+  /// Goes on from a surface as the bsdf has sampled it.
+  VIRGA_HD bool leave(Path& path, const SurfacePoint& point, const Side& side, const BsdfSample& s,
+                      const MediaState& media, Sampler& sampler) const {
     if (!(s.pdf > 0) || isBlack(s.weight)) return false;
-    const Vec3 wi = side.frame.toWorld(s.wi);
+    const Vec3 wo = -path.at.ray.d, wi = side.frame.toWorld(s.wi);
     if (side.leaks(wi, s.wi)) return false;
     path.throughput *= s.weight;
     path.etaScale *= s.eta * s.eta;
-    path.last = {point.p, s.pdf, !specular, 0, {}};
+    path.last = {point.p, s.pdf, !s.specular, 0, {}};
     path.at = leaveSurface(point, wo, wi, media);
     path.tMax = kInfinity;
     ++path.depth;
     return survives(path, sampler);
+  }
+
+  /// Through thin glass: no vertex, but that lights behind it are in the caustic layers. Connections have looked
+  /// through it.
+  VIRGA_HD bool passStraight(Path& path, const SurfacePoint& point, Rgb weight, const MediaState& media,
+                             float t) const {
+    path.layers.scatterSpecularly();
+    path.throughput *= weight;
+    path.at = leaveSurface(point, -path.at.ray.d, path.at.ray.d, media);
+    path.tMax -= t;
+    return !isBlack(path.throughput);
   }
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
