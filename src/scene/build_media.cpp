@@ -38,9 +38,10 @@ auto loadedFrom(PluginReader& reader, std::string_view parameter, const Load& lo
   }
 }
 
+// Of no extent, but where it is an extinction: there Mitsuba takes it for a grid of one voxel (readSigmaT).
 VolumeField buildConstantVolume(BuildContext&, PluginReader& reader, VolumeUse) {
-  reader.ignore("to_world");
-  return {reader.color("value", Rgb(1.f)), nullptr, nullptr, {}};
+  const Matrix4 voxel = reader.transform("to_world") * Matrix4::translation(0.5, 0.5, 0.5);
+  return {reader.color("value", Rgb(1.f)), nullptr, nullptr, voxel};
 }
 
 // The two plugins place their grids by different rules, so neither reads what is the other's.
@@ -144,10 +145,15 @@ void readAlbedo(BuildContext& context, PluginReader& reader, MediumView& medium)
 void readSigmaT(BuildContext& context, PluginReader& reader, MediumView& medium) {
   const NodePtr volume = reader.child("volume", "sigma_t");
   if (!volume) return setSigmaT(medium, reader.color("sigma_t", Rgb(1.f)));
-  const VolumeField field = buildVolume(context, *volume, VolumeUse::extinction);
-  if (!field.grid) return setSigmaT(medium, field.constant);
+  VolumeField field = buildVolume(context, *volume, VolumeUse::extinction);
+  if (field.grid) {
+    medium.sigmaT = 1;
+  } else {
+    setSigmaT(medium, field.constant);
+    if (reader.node().type != "heterogeneous") return;
+    field.grid = context.cached<Grid>(&PartCache::grids, "one voxel", [] { return Grid::dense(1, 1, 1, {1.f}); });
+  }
   medium.homogeneous = false;
-  medium.sigmaT = 1;
   medium.density = field.grid->view();
   if (field.rgbGrid) medium.densityColors = field.rgbGrid->view();
   medium.worldToDensity = Affine(field.indexToWorld.inverse());

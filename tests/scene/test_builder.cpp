@@ -138,6 +138,23 @@ TEST(Builder, LenientTurnsUnknownParametersIntoWarnings) {
   EXPECT_THROW(buildScene(bad, {.filmSize = {}, .lenient = true}), Error) << "lenience does not make up for bad values";
 }
 
+// As in Mitsuba 3: a constant extinction is a grid of one voxel. A colour is no volume, and homogeneous media have no
+// extent.
+TEST(Builder, AConstantExtinctionFillsItsUnitCube) {
+  const auto view = [](const std::string& type) {
+    const SceneSnapshot scene = test::build(
+        boundary("<medium name=\"interior\" type=\"" + type +
+                 "\"><volume name=\"sigma_t\" type=\"constvolume\"><rgb name=\"value\" "
+                 "value=\"1, 2, 4\"/><transform name=\"to_world\"><scale value=\"2\"/></transform></volume></medium>"));
+    return std::pair(scene, scene->view.media[0]);
+  };
+  const auto [scene, medium] = view("heterogeneous");
+  EXPECT_EQ(medium.sigmaTAt({1.9f, 0.1f, 1}), Rgb(1, 2, 4));
+  EXPECT_EQ(medium.sigmaTAt({2.1f, 0.1f, 1}), Rgb());
+  const auto [everywhere, same] = view("homogeneous");
+  EXPECT_EQ(same.sigmaTAt({2.1f, 0.1f, 1}), Rgb(1, 2, 4));
+}
+
 TEST(Builder, ValuesOutOfRange) {
   const auto inMedium = [](const std::string& p) {
     return boundary("<medium name=\"interior\" type=\"homogeneous\">" + p + "</medium>");
