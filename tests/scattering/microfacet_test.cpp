@@ -157,7 +157,7 @@ void expectConsistentSamples(const Model& model, double etaSquared) {
       ASSERT_NEAR(s.weight[c], there[c] * std::fabs(s.wi.z) / pdf, tolerance * s.weight[c]);
       // Near total reflection, what is left of 1 - F loses digits.
       const double expected = scale * static_cast<double>(there[c]);
-      ASSERT_NEAR(static_cast<double>(back[c]), expected, 1e-3 * expected + 1e-6)
+      ASSERT_NEAR(static_cast<double>(back[c]), expected, static_cast<double>(tolerance) * expected + 3e-6)
           << "reciprocity " << wo.z << " " << s.wi.z;
     }
   }
