@@ -192,7 +192,7 @@ def print_table(rows):
 
 PAGE = """# Speed
 
-Written by `scripts/bench.sh --page docs/results/speed.md`, {threads} threads, {size} x {size} pixels, median of {runs} runs. k = seconds x relMSE is a constant of an
+Written by `scripts/bench.sh --page docs/results/speed.md`, {threads} threads, {size} x {size} pixels, median over {runs} seed(s). k = seconds x relMSE is a constant of an
 unbiased renderer on a scene: lower is better, and k / relMSE is the time that it needs. Seconds are (user + system) / threads of the whole process;
 relMSE is against a converged picture of another seed, whose own error is subtracted. Only ratios within one table mean anything.
 
