@@ -12,7 +12,7 @@ echo "== packages"
 scripts/install-deps.sh
 
 echo "== layout"
-git ls-files '*.h' '*.cpp' | xargs clang-format --dry-run -Werror
+find src tests bench \( -name '*.h' -o -name '*.cpp' \) -print0 | xargs -0 clang-format --dry-run -Werror
 
 echo "== release build"
 scripts/build.sh release
