@@ -167,9 +167,5 @@ VIRGA_HD Rgb passMedia(const SceneView& scene, const Rays& rays, MediaRay& r, fl
   });
   return product;
 }
-template <class Rays>
-VIRGA_HD Rgb transmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, Pcg32& random) {
-  return passMedia(scene, rays, r, tMax, random);
-}
 
 }  // namespace virga

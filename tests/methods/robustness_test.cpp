@@ -203,7 +203,8 @@ TEST_F(Meshes, WoundBadlyHoldTheirMediumAllTheSame) {
 float transmittanceAlong(const Scene& scene, const MediaRay& ray) {
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
   Pcg32 random(1);
-  return transmittance(scene.view, rays, ray, kInfinity, random).g;
+  MediaRay walked = ray;
+  return passMedia(scene.view, rays, walked, kInfinity, random).g;
 }
 Ray cameraRay(const Scene& scene, Vec3 w) { return {scene.camera.toWorld.translation + w * 0.01f, w}; }
 float transmittanceFromCamera(const Scene& scene, Vec3 w) {

@@ -4,8 +4,7 @@
 #include "core/sampler.h"
 #include "image/layers.h"
 #include "transport/equiangular.h"
-#include "transport/layer_path.h"
-#include "transport/media_walk.h"
+#include "transport/visibility.h"
 
 namespace virga {
 
@@ -60,18 +59,6 @@ class PathTracer {
     LayerRadiance radiance;
 
     VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
-  };
-
-  /// The side of a surface that a ray arrives on.
-  struct Side {
-    const Bsdf* bsdf;
-    Frame frame;  ///< around the shading normal; turned over for the back of a two-sided bsdf
-    Vec3 wo;      ///< local
-    Vec3 normal;  ///< geometric, on the frame's side
-
-    /// Shading and true normal disagree about which side a direction is on: light would leak through the surface.
-    /// Mirrors and glass go by the shading normal alone, or their outlines would be dark.
-    VIRGA_HD bool leaks(Vec3 world, Vec3 local) const { return !bsdf->specular() && dot(world, normal) * local.z <= 0; }
   };
 
   /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
@@ -182,41 +169,9 @@ class PathTracer {
 
   // --- next-event estimation ---
 
-  /// Transmittance times visibility from x to the point that was sampled on a light; 0 where a surface is in the way.
-  /// `r` starts at x or, off a surface, a little beside it: the ray is aimed anew, or it would meet the light before it
-  /// is expected to. Light that passes thin glass is noted in `layers`.
-  VIRGA_HD Rgb visibility(MediaRay r, Vec3 x, const LightSample& light, LayerPath& layers, Sampler& sampler) const {
-    float tMax = kInfinity;
-    if (!std::isinf(light.distance)) {
-      const Vec3 toLight = x + light.wi * light.distance - r.ray.o;
-      const float d = length(toLight);
-      // Stop short of the light's own surface: beyond the errors of both ends, whose coordinates may be large.
-      tMax = d * (1 - 10 * kHitError) - kHitError * std::max(0.5f * maxComponent(abs(r.ray.o)), 5e-2f * scene_.scale);
-      if (tMax <= 0) return Rgb(1.f);
-      r.ray.d = toLight / d;
-    }
-    if (scene_.thinGlass) return throughThinGlass(r, tMax, layers, sampler);
-    if (rays_.occluded(r.ray, tMax)) return {};
-    return transmittance(scene_, rays_, r, tMax, sampler.stream());
-  }
-
-  VIRGA_HD Rgb throughThinGlass(MediaRay r, float tMax, LayerPath& layers, Sampler& sampler) const {
-    const Vec3 d = r.ray.d, end = r.ray.at(tMax);
-    Rgb seen(1.f);
-    while (!isBlack(seen)) {
-      const RayHit hit = rays_.nearest(r.ray, tMax);
-      if (!hit.found()) return seen * passMedia(scene_, rays_, r, tMax, sampler.stream());
-      const SurfacePoint point = surfacePoint(scene_.surfaces[hit.shape], r.ray, hit, scene_.scale);
-      Bsdf textured;
-      const Side side = sideOf(point, hit, -d, textured);
-      if (!side.bsdf->isThin()) return {};
-      seen *= passMedia(scene_, rays_, r, hit.t, sampler.stream()) * side.bsdf->straight(side.wo.z);
-      layers.scatterSpecularly();
-      r = leaveSurface(point, -d, d, r.media);
-      if (!std::isinf(tMax)) tMax = dot(end - r.ray.o, d);
-      if (tMax <= 0) return seen;
-    }
-    return seen;
+  VIRGA_HD Rgb visibility(const MediaRay& r, Vec3 x, const LightSample& light, LayerPath& layers,
+                          Sampler& sampler) const {
+    return virga::visibility(scene_, rays_, r, x, light, layers, sampler.stream());
   }
 
   struct Connection {
@@ -306,7 +261,7 @@ class PathTracer {
     if (isBlack(value)) return;
     const float own = c.choice * c.light.pdf;
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
-    const MediaRay leaving = leaveSurface(point, -path.at.ray.d, c.light.wi, media);
+    const MediaRay leaving = leaveSurface(scene_, point, -path.at.ray.d, c.light.wi, media);
     LayerPath layers = path.layers;
     const Rgb seen = visibility(leaving, point.p, c.light, layers, sampler);
     path.add(layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
@@ -336,33 +291,6 @@ class PathTracer {
     return survives(path, sampler);
   }
 
-  /// `textured` holds the bsdf, where textures say what its colours are here.
-  VIRGA_HD Side sideOf(const SurfacePoint& point, const RayHit& hit, Vec3 wo, Bsdf& textured) const {
-    const ShapeView& shape = scene_.surfaces[point.shape];
-    const SurfaceBsdf& surface = scene_.bsdfs[shape.bsdf];
-    const bool back = surface.twoSided && dot(wo, point.geometricNormal) < 0;
-    const Vec3 n = back ? -point.shadingNormal : point.shadingNormal;
-    Frame frame(n);
-    const Bsdf* bsdf = back ? &surface.back : &surface.front;
-    if (surface.anisotropic) frame = Frame(n, surfaceTangent(shape, point.p, hit.primitive));
-    if (surface.textured) {
-      const Vec2 uv = surfaceUv(shape, point.p, hit.primitive, {hit.u, hit.v});
-      textured = bsdfAt(scene_, *bsdf, back ? surface.backTextures : surface.frontTextures, uv);
-      bsdf = &textured;
-    }
-    return {bsdf, frame, frame.toLocal(wo), back ? -point.geometricNormal : point.geometricNormal};
-  }
-
-  /// The ray toward wi off a surface that was reached from wo: if it passes, the media of the other side are around it.
-  VIRGA_HD MediaRay leaveSurface(const SurfacePoint& point, Vec3 wo, Vec3 wi, const MediaState& media) const {
-    MediaRay leaving = virga::leaveSurface(point, wi, media);
-    const MediumTransition& transition = scene_.surfaces[point.shape].media;
-    const float side = dot(wi, point.geometricNormal);
-    if (transition.replaces && side * dot(wo, point.geometricNormal) < 0)
-      leaving.media.pass(transition, side < 0 ? Passing::inward : Passing::outward);
-    return leaving;
-  }
-
   VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {
     const ShapeView& shape = scene_.surfaces[hit.shape];
     const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
@@ -370,7 +298,7 @@ class PathTracer {
     if (!mayScatter(path) && !scene_.thinGlass) return false;
     const Vec3 wo = -path.at.ray.d;
     Bsdf textured;
-    const Side side = sideOf(point, hit, wo, textured);
+    const Side side = sideOf(scene_, point, hit, wo, textured);
     if (side.bsdf->isThin()) {
       const BsdfSample s = side.bsdf->sample(side.wo, {}, one(path, sampler));
       if (s.wi.z * side.wo.z < 0) return passStraight(path, point, s.weight, media, hit.t);
@@ -399,7 +327,7 @@ class PathTracer {
     path.throughput *= s.weight;
     path.etaScale *= s.eta * s.eta;
     path.last = {point.p, s.pdf, !s.specular, 0, {}};
-    path.at = leaveSurface(point, wo, wi, media);
+    path.at = leaveSurface(scene_, point, wo, wi, media);
     path.tMax = kInfinity;
     ++path.depth;
     return survives(path, sampler);
@@ -411,7 +339,7 @@ class PathTracer {
                              float t) const {
     path.layers.scatterSpecularly();
     path.throughput *= weight;
-    path.at = leaveSurface(point, -path.at.ray.d, path.at.ray.d, media);
+    path.at = leaveSurface(scene_, point, -path.at.ray.d, path.at.ray.d, media);
     path.tMax -= t;
     return !isBlack(path.throughput);
   }
