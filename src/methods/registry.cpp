@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "methods/instant_scattering/ims_method.h"
 #include "methods/method.h"
 #include "methods/path/path_method.h"
 
@@ -11,6 +12,10 @@ const MethodInfo kMethods[] = {
     {"path", "volumetric path tracing with next-event estimation: the unbiased reference",
      "Novak et al. 2018, Monte Carlo methods for volumetric light transport simulation (survey)", LayerMask::all(),
      Accuracy::unbiased, kPathSettings, createPath},
+    {"ims", "instant multiple scattering: virtual point lights in media, with bias compensation",
+     "Engelhardt, Novak and Dachsbacher 2010, Instant multiple scattering for interactive rendering of heterogeneous "
+     "participating media",
+     LayerMask::all(), Accuracy::unbiased, kImsSettings, createIms},
 };
 
 }  // namespace

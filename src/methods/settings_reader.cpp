@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 
 namespace virga {
 
@@ -25,6 +26,16 @@ std::optional<int> SettingsReader::integer(std::string_view name, int lowest) co
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
   if (error != std::errc() || end != text->data() + text->size() || value < lowest)
     fail(name, fmt::format("an integer of at least {}", lowest));
+  return value;
+}
+
+std::optional<float> SettingsReader::number(std::string_view name, float above) const {
+  const std::string* text = find(name);
+  if (!text) return {};
+  float value = 0;
+  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  if (error != std::errc() || end != text->data() + text->size() || !std::isfinite(value) || !(value > above))
+    fail(name, fmt::format("a number above {}", above));
   return value;
 }
 

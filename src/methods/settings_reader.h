@@ -17,6 +17,8 @@ class SettingsReader {
 
   /// Empty where the setting was not given.
   std::optional<int> integer(std::string_view name, int lowest) const;
+  /// Finite and above `above`.
+  std::optional<float> number(std::string_view name, float above) const;
   std::optional<bool> boolean(std::string_view name) const;
 
  private:

@@ -140,6 +140,18 @@ class Bsdf {
   VIRGA_HD bool transmits() const {
     return kind_ == Kind::dielectric || kind_ == Kind::thinDielectric || kind_ == Kind::roughDielectric;
   }
+  /// Its lobes are so wide that a direction chosen without regard to them may serve: light is gathered at such surfaces
+  /// from virtual lights.
+  VIRGA_HD bool broad() const {
+    return dispatch(*this, [](const auto& b) {
+      if constexpr (requires { b.facets; })
+        return std::fmin(b.facets.alphaX, b.facets.alphaY) >= 0.3f;
+      else if constexpr (requires { b.exponent; })
+        return b.exponent <= 20 || maxComponent(b.specular) == 0;
+      else
+        return requires { b.value(Vec3(), Vec3()); };
+    });
+  }
   /// Lets a part of the light go on as if nothing were there: connections look through it.
   VIRGA_HD bool isThin() const { return kind_ == Kind::thinDielectric; }
   /// That part; 0 for all others.

@@ -50,6 +50,11 @@ struct PerspectiveCamera {
   int filmWidth = 1, filmHeight = 1;                ///< of the whole film [pixels]
   int cropX = 0, cropY = 0, width = 1, height = 1;  ///< the part that is rendered [pixels]
 
+  /// Number of a pixel on the whole film, so that a crop window shows the very same samples.
+  VIRGA_HD uint32_t pixelStream(int x, int y) const {
+    return static_cast<uint32_t>(y + cropY) * static_cast<uint32_t>(filmWidth) + static_cast<uint32_t>(x + cropX);
+  }
+
   /// (x, y) in pixels of the crop window, from its top left corner.
   VIRGA_HD CameraRay ray(float x, float y) const {
     const float sx = 1 - 2 * ((x + static_cast<float>(cropX)) / static_cast<float>(filmWidth) + shiftX);

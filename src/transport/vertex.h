@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "transport/layer_path.h"
 #include "transport/media_walk.h"
 
 namespace virga {
@@ -46,63 +47,80 @@ VIRGA_HD inline MediaRay leaveSurface(const SceneView& scene, const SurfacePoint
   return leaving;
 }
 
-/// A point where light scatters other than in a perfect mirror or window, remembered so that it can be connected to.
-class Vertex {
- public:
-  enum class Kind : uint8_t { none, surface, medium };
+/// |cosine| of w to a surface; 1 in a medium, whose normal is 0.
+VIRGA_HD inline float generalCosine(Vec3 normal, Vec3 w) {
+  return normal.x == 0 && normal.y == 0 && normal.z == 0 ? 1 : std::fabs(dot(normal, w));
+}
+/// Generalised geometry term D_x D_y / |x - y|^2 [1/unit^2], visibility and transmittance left out
+/// (docs/architecture.md).
+VIRGA_HD inline float geometryTerm(Vec3 x, Vec3 normalX, Vec3 y, Vec3 normalY) {
+  const Vec3 way = y - x;
+  const float d2 = lengthSquared(way);
+  if (!(d2 > 0)) return kInfinity;
+  const Vec3 w = way / std::sqrt(d2);
+  return generalCosine(normalX, w) * generalCosine(normalY, w) / d2;
+}
 
-  Kind kind = Kind::none;
+/// What light from `wi` adds toward `to`, and the density [1/sr] with which a path that comes from `to` goes on to wi.
+struct Scattering {
+  Rgb value;      ///< albedo times phase function, or bsdf times |cosine of wi| [1/sr]
+  float pdf = 0;  ///< 0 where the value is black
+};
+
+/// A surface at one point, reached on one of its sides, kept for directions that come later.
+struct SurfaceScattering {
+  Bsdf bsdf;
+  Frame frame{Vec3(0, 0, 1)};
+  Vec3 normal;  ///< as in Side
+
+  SurfaceScattering() = default;
+  VIRGA_HD explicit SurfaceScattering(const Side& side) : bsdf(*side.bsdf), frame(side.frame), normal(side.normal) {}
+
+  VIRGA_HD Scattering scattering(Vec3 to, Vec3 wi) const {
+    const Vec3 localTo = frame.toLocal(to), local = frame.toLocal(wi);
+    if (dot(to, normal) * localTo.z <= 0 || dot(wi, normal) * local.z <= 0) return {};  // it would leak: Side::leaks()
+    const Rgb value = bsdf.value(localTo, local) * std::fabs(local.z);
+    return {value, isBlack(value) ? 0 : bsdf.pdf(localTo, local)};
+  }
+};
+
+/// A point where light scatters other than in a perfect mirror or window, as a path from the eye comes to it.
+struct Vertex {
+  VertexKind kind = VertexKind::none;
   Vec3 p;            ///< world
-  Vec3 wo;           ///< unit, toward the vertex that the path came from
+  Vec3 wo;           ///< unit, toward where the path came from
   MediaState media;  ///< around p, on wo's side of a surface
-  int medium = -1;   ///< in which the light scatters; -1 on surfaces
+  int medium = -1;   ///< the one that scatters; -1 on surfaces
+  PhaseFunction phase{Isotropic{}};
+  Rgb albedo;
+  SurfacePoint point;  ///< on surfaces
+  SurfaceScattering surface;
 
   VIRGA_HD static Vertex inMedium(const SceneView& scene, int medium, Vec3 p, Vec3 wo, const MediaState& media) {
     Vertex v;
-    v.kind = Kind::medium, v.p = p, v.wo = wo, v.media = media, v.medium = medium;
-    v.phase_ = scene.media[medium].phaseAt(p);
-    v.albedo_ = scene.media[medium].albedoAt(p);
+    v.kind = VertexKind::medium, v.p = p, v.wo = wo, v.media = media, v.medium = medium;
+    v.phase = scene.media[medium].phaseAt(p), v.albedo = scene.media[medium].albedoAt(p);
     return v;
   }
   VIRGA_HD static Vertex onSurface(const SurfacePoint& point, const Side& side, Vec3 wo, const MediaState& media) {
     Vertex v;
-    v.kind = Kind::surface, v.p = point.p, v.wo = wo, v.media = media;
-    v.point_ = point;
-    v.bsdf_ = *side.bsdf, v.frame_ = side.frame, v.normal_ = side.normal;
+    v.kind = VertexKind::surface, v.p = point.p, v.wo = wo, v.media = media;
+    v.point = point, v.surface = SurfaceScattering(side);
     return v;
   }
 
-  /// What light from wi adds toward `to`: albedo times phase function, or bsdf times |cosine of wi|; with the density
-  /// [1/sr] with which a path that arrives from `to` goes on to wi.
-  struct Scattering {
-    Rgb value;
-    float pdf = 0;  ///< 0 where the value is black: such a path would have ended
-  };
-  VIRGA_HD Scattering scattering(Vec3 to, Vec3 wi) const {
-    if (kind == Kind::medium) return {albedo_ * phase_.value(to, wi), isBlack(albedo_) ? 0 : phase_.pdf(to, wi)};
-    const Vec3 localTo = frame_.toLocal(to), local = frame_.toLocal(wi);
-    const bool leaks = dot(to, normal_) * localTo.z <= 0 || dot(wi, normal_) * local.z <= 0;
-    // From the other side of the surface it is another vertex, if it is two-sided.
-    if (leaks || dot(to, normal_) * dot(wo, normal_) <= 0) return {};
-    const Rgb value = bsdf_.value(localTo, local) * std::fabs(local.z);
-    return {value, isBlack(value) ? 0 : bsdf_.pdf(localTo, local)};
+  /// Of light from wi, toward where the path came from.
+  VIRGA_HD Scattering scattering(Vec3 wi) const {
+    if (kind == VertexKind::surface) return surface.scattering(wo, wi);
+    return {albedo * phase.value(wo, wi), isBlack(albedo) ? 0 : phase.pdf(wo, wi)};
   }
-  /// |cosine| of w to the surface; 1 in a medium.
-  VIRGA_HD float cosine(Vec3 w) const { return kind == Kind::surface ? std::fabs(dot(w, point_.geometricNormal)) : 1; }
-
+  /// Geometric; 0 in a medium.
+  VIRGA_HD Vec3 normal() const { return kind == VertexKind::surface ? point.geometricNormal : Vec3(0); }
   /// The ray from here toward wi.
   VIRGA_HD MediaRay leave(const SceneView& scene, Vec3 wi) const {
-    if (kind == Kind::medium) return {{p, wi}, media, 0};
-    return leaveSurface(scene, point_, wo, wi, media);
+    if (kind == VertexKind::medium) return {{p, wi}, media, 0};
+    return leaveSurface(scene, point, wo, wi, media);
   }
-
- private:
-  PhaseFunction phase_{Isotropic{}};
-  Rgb albedo_;
-  SurfacePoint point_;
-  Bsdf bsdf_;
-  Frame frame_{Vec3(0, 0, 1)};
-  Vec3 normal_;
 };
 
 }  // namespace virga

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "transport/layer_path.h"
 #include "transport/vertex.h"
 
 namespace virga {

@@ -41,7 +41,7 @@ class PathMethod final : public Method {
       const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
       for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
         for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x)
-          frame.set(x, y, pixels.sample(x, y, {seed_, replicate, pixelStream(x, y), sample}));
+          frame.set(x, y, pixels.sample(x, y, {seed_, replicate, scene_->camera.pixelStream(x, y), sample}));
     });
     return {.completed = !stop.stop_requested()};
   }
@@ -51,11 +51,6 @@ class PathMethod final : public Method {
     return {.maxDepth = maxDepth_.value_or(scene_->integrator.maxDepth),
             .rrDepth = rrDepth_.value_or(scene_->integrator.rrDepth),
             .equiangularDepth = equiangularDepth_.value_or(PathOptions{}.equiangularDepth)};
-  }
-  // Pixels by their place on the whole film, so that a crop window shows the very same samples.
-  uint32_t pixelStream(int x, int y) const {
-    const PerspectiveCamera& c = scene_->camera;
-    return static_cast<uint32_t>(y + c.cropY) * static_cast<uint32_t>(c.filmWidth) + static_cast<uint32_t>(x + c.cropX);
   }
 
   SceneSnapshot scene_;

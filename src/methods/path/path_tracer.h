@@ -4,6 +4,7 @@
 #include "core/sampler.h"
 #include "image/layers.h"
 #include "transport/equiangular.h"
+#include "transport/roulette.h"
 #include "transport/visibility.h"
 
 namespace virga {
@@ -28,17 +29,6 @@ class PathTracer {
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
       : scene_(scene), rays_(rays), options_(options), aims_(hasLightsToAimAt(scene)) {}
 
-  /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
-  VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler) const {
-    Path path;
-    path.at = leaveCamera(scene_, camera.ray);
-    path.tMax = camera.tMax;
-    while (extend(path, sampler)) {
-    }
-    return path.radiance;
-  }
-
- private:
   /// How the last vertex chose the ray's direction: what multiple importance sampling needs when the ray meets a light.
   struct LastVertex {
     Vec3 p;
@@ -46,6 +36,19 @@ class PathTracer {
     bool connected = false;  ///< it sampled the lights too; not so the camera and specular vertices
     float t = 0;             ///< its place on `segment`, if that is active: it could have been found by technique B
     EquiangularSegment segment;
+  };
+
+  /// A vertex, and what the path had carried to it.
+  struct Record {
+    Vertex vertex;
+    Rgb throughput;
+  };
+  /// The last vertex, if the light of virtual lights was gathered there (`ims`): then only what their clamping took of
+  /// the light from the next vertex is still to be found.
+  struct Link {
+    bool active = false;
+    Vec3 p;
+    Vec3 normal;  ///< 0 in a medium
   };
 
   struct Path {
@@ -57,31 +60,26 @@ class PathTracer {
     LastVertex last;
     LayerPath layers;
     LayerRadiance radiance;
+    Record* record = nullptr;  ///< where to write down vertices that virtual lights can light; null: nowhere
+    float bound = 0;           ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
+    Link link;
 
     VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
   };
 
-  /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
-  static constexpr int kStratifiedBounces = 4;
-  /// Survival where nothing absorbs: it ends paths in closed white furnaces and in white fog without end, where else
-  /// they would go on for ever. n events survive with probability about (1 + n / 1000)^-2, so that weights grow as a
-  /// power of n, not exponentially: with a constant 0.98 they grew faster than paths left white media of 13 mean free
-  /// paths or more.
-  VIRGA_HD static float mostSurvival(int depth) { return 1 - 2 / (1000 + static_cast<float>(depth)); }
+  /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
+  VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler) const {
+    Path path = start(camera);
+    while (extend(path, sampler)) {
+    }
+    return path.radiance;
+  }
 
-  VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
-    return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
-  }
-  VIRGA_HD static float one(const Path& path, Sampler& sampler) {
-    return path.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
-  }
-  /// Power heuristic (exponent 2) of a technique against up to two others.
-  VIRGA_HD static float weight(float own, float other, float third = 0) {
-    return own > 0 ? 1 / (1 + square(other / own) + square(third / own)) : 0;
-  }
-  /// May light still be connected after one more scattering event?
-  VIRGA_HD bool mayScatter(const Path& path) const {
-    return options_.maxDepth < 0 || path.depth + 2 <= options_.maxDepth;
+  VIRGA_HD Path start(const CameraRay& camera) const {
+    Path path;
+    path.at = leaveCamera(scene_, camera.ray);
+    path.tMax = camera.tMax;
+    return path;
   }
 
   /// Follows the ray to its next vertex and scatters there; false at the end of the path.
@@ -113,6 +111,43 @@ class PathTracer {
     if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
     addEnvironment(path);
     return false;
+  }
+
+ private:
+  /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
+  static constexpr int kStratifiedBounces = 4;
+  VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
+    return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
+  }
+  VIRGA_HD static float one(const Path& path, Sampler& sampler) {
+    return path.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
+  }
+  /// Power heuristic (exponent 2) of a technique against up to two others.
+  VIRGA_HD static float weight(float own, float other, float third = 0) {
+    return own > 0 ? 1 / (1 + square(other / own) + square(third / own)) : 0;
+  }
+  /// May light still be connected after one more scattering event?
+  VIRGA_HD bool mayScatter(const Path& path) const {
+    return options_.maxDepth < 0 || path.depth + 2 <= options_.maxDepth;
+  }
+
+  // --- what virtual lights have left (ims) ---
+
+  /// The share of the light from x, with `normal` (0 in a medium), that the clamping of virtual lights took at the last
+  /// vertex: max(0, G - b) / G; all of it where none were gathered.
+  VIRGA_HD static float clampedShare(const Path& path, Vec3 x, Vec3 normal) {
+    if (!path.link.active) return 1;
+    const float g = geometryTerm(path.link.p, path.link.normal, x, normal);
+    return g > path.bound ? 1 - path.bound / g : 0;
+  }
+  VIRGA_HD static bool survivesClamping(const Path& path, Vec3 x, Vec3 normal, Sampler& sampler) {
+    const float q = clampedShare(path, x, normal);
+    return q == 1 || (q > 0 && sampler.random() < q);
+  }
+  /// After a vertex that is written down the path is linked to virtual lights.
+  VIRGA_HD static void record(Path& path, const Vertex& vertex) {
+    *path.record = {vertex, path.throughput};
+    path.link = {true, vertex.p, vertex.normal()};
   }
 
   VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
@@ -206,7 +241,8 @@ class PathTracer {
     if (!(distance.pdf > 0)) return;
     const Vec3 x = segment.ray.at(distance.t), wo = -segment.ray.d;
     const LightSample light = towardPoint(emitter, x, on);
-    if (!(light.pdf > 0) || isBlack(light.radiance)) return;
+    const float share = clampedShare(path, x, Vec3(0));
+    if (!(light.pdf > 0) || !(share > 0) || isBlack(light.radiance)) return;
 
     const MediumView& medium = scene_.media[segment.medium];
     const PhaseFunction phase = medium.phaseAt(x);
@@ -221,11 +257,11 @@ class PathTracer {
       w = weight(own, connected * connection, flight * phase.pdf(wo, light.wi));
     }
     LayerPath layers = path.layers;
-    layers.scatter(LayerPath::Vertex::medium);
+    layers.scatter(VertexKind::medium);
     const Rgb seen = visibility({{x, light.wi}, media, 0}, x, light, layers, sampler);
     // sigma_s tau = albedo * sigma_t tau
     const Rgb scattered = medium.albedoAt(x) * segment.flight(distance.t) * light.radiance;
-    path.add(layers, scattered * seen * (phase.value(wo, light.wi) * w / own));
+    path.add(layers, scattered * seen * (phase.value(wo, light.wi) * w * share / own));
   }
 
   /// Technique A at a medium vertex.
@@ -274,9 +310,11 @@ class PathTracer {
     if (!mayScatter(path)) return false;
     const MediumView& medium = scene_.media[collision.medium];
     const Vec3 x = path.at.ray.at(collision.t), wo = -path.at.ray.d;
+    if (!survivesClamping(path, x, Vec3(0), sampler)) return false;
+    if (path.record) record(path, Vertex::inMedium(scene_, collision.medium, x, wo, media));
     path.throughput *= medium.albedoAt(x);
     if (isBlack(path.throughput)) return false;
-    path.layers.scatter(LayerPath::Vertex::medium);
+    path.layers.scatter(VertexKind::medium);
     path.last = {x, 0, true, collision.t, {}};
     if (segment.contains(collision.t) && collision.medium == segment.medium) path.last.segment = segment;
     const PhaseFunction phase = medium.phaseAt(x);
@@ -303,6 +341,7 @@ class PathTracer {
       const BsdfSample s = side.bsdf->sample(side.wo, {}, one(path, sampler));
       if (s.wi.z * side.wo.z < 0) return passStraight(path, point, s.weight, media, hit.t);
       path.layers.scatterSpecularly();
+      path.link = {};
       return mayScatter(path) && leave(path, point, side, s, media, sampler);
     }
     if (!mayScatter(path)) return false;
@@ -310,8 +349,15 @@ class PathTracer {
     const bool specular = side.bsdf->specular();
     if (specular) {
       path.layers.scatterSpecularly();
+      path.link = {};
     } else {
-      path.layers.scatter(LayerPath::Vertex::surface);
+      if (path.record && side.bsdf->broad()) {
+        if (!survivesClamping(path, point.p, point.geometricNormal, sampler)) return false;
+        record(path, Vertex::onSurface(point, side, wo, media));
+      } else {
+        path.link = {};
+      }
+      path.layers.scatter(VertexKind::surface);
       connectSurface(path, point, side, media, sampler);
     }
     const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
@@ -338,6 +384,7 @@ class PathTracer {
   VIRGA_HD bool passStraight(Path& path, const SurfacePoint& point, Rgb weight, const MediaState& media,
                              float t) const {
     path.layers.scatterSpecularly();
+    path.link = {};
     path.throughput *= weight;
     path.at = leaveSurface(scene_, point, -path.at.ray.d, path.at.ray.d, media);
     path.tMax -= t;

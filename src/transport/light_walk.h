@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "core/sampler.h"
+#include "transport/roulette.h"
+#include "transport/vertex.h"
+
+namespace virga {
+
+/// Where a walk from a light scatters.
+struct LightVertex {
+  VertexKind kind = VertexKind::none;
+  Vec3 p;            ///< world
+  Vec3 wi;           ///< unit, toward where the light came from
+  Rgb weight;        ///< light that is scattered here, before phase function or bsdf * |cosine of wi| [W]
+  int medium = -1;   ///< the one that scatters; -1 on surfaces
+  int depth = 0;     ///< scattering events, this one included; specular ones count, thin glass that is passed does not
+  int surface = -1;  ///< where its SurfaceScattering is kept
+  Vec3 normal;       ///< geometric, on surfaces; 0 in media
+};
+
+/// Random walks that carry flux from the lights (methods.md 2.1; Dachsbacher et al.'s virtual point lights in media,
+/// equations of section 3 of the instant-scattering paper). Shared by all methods that trace light.
+///
+/// A vertex in a medium is found by an exact free flight: its weight is the flux times the albedo. Surfaces scatter by
+/// the adjoint of their bsdf: no scaling of refracted radiance, corrected for shading normals (Veach 1997, 5.3).
+template <class Rays>
+class LightWalker {
+ public:
+  VIRGA_HD LightWalker(const SceneView& scene, const Rays& rays, int maxDepth)
+      : scene_(scene), rays_(rays), maxDepth_(maxDepth) {}
+
+  /// From `start`, which carries `flux`. visit(vertex, scattering) at each vertex in a medium or on a broad bsdf
+  /// (Bsdf::broad); `scattering` is null in media. maxDepth: scattering events; -1: no limit.
+  template <class Visit>
+  VIRGA_HD void walk(const MediaRay& start, Rgb flux, Sampler& sampler, Visit&& visit) const {
+    State state{start, flux};
+    while (!isBlack(state.flux) && step(state, sampler, visit)) {
+    }
+  }
+
+ private:
+  struct State {
+    MediaRay at;
+    Rgb flux;
+    int depth = 0;
+  };
+
+  static constexpr int kStratifiedBounces = 4;
+  VIRGA_HD static Vec2 pair(const State& s, Sampler& sampler) {
+    return s.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
+  }
+  VIRGA_HD static float one(const State& s, Sampler& sampler) {
+    return s.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
+  }
+
+  template <class Visit>
+  VIRGA_HD bool step(State& state, Sampler& sampler, Visit& visit) const {
+    if (maxDepth_ >= 0 && state.depth >= maxDepth_) return false;
+    const RayHit hit = rays_.nearest(state.at.ray, kInfinity);
+    MediaRay flown = state.at;
+    Collision collision;
+    SpectralFlight spectral(state.flux, scene_.chromatic ? one(state, sampler) : 0.f);
+    walkMedia(scene_, rays_, flown, hit.t, [&](float t0, float t1) {
+      if (flown.media.vacuum()) return true;
+      collision = scene_.chromatic ? sampleCollision(scene_, flown, t0, t1, sampler.stream(), spectral)
+                                   : sampleCollision(scene_, flown, t0, t1, sampler.stream());
+      return !collision.found();
+    });
+    if (scene_.chromatic) state.flux *= spectral.weight(state.flux);
+    if (collision.found()) return scatterInMedium(state, flown.media, collision, sampler, visit);
+    return hit.found() && scatterOnSurface(state, flown.media, hit, sampler, visit);
+  }
+
+  template <class Visit>
+  VIRGA_HD bool scatterInMedium(State& state, const MediaState& media, const Collision& collision, Sampler& sampler,
+                                Visit& visit) const {
+    const MediumView& medium = scene_.media[collision.medium];
+    const Vec3 p = state.at.ray.at(collision.t), wi = -state.at.ray.d;
+    const Rgb scattered = state.flux * medium.albedoAt(p);
+    if (isBlack(scattered)) return false;
+    LightVertex v;
+    v.kind = VertexKind::medium, v.p = p, v.wi = wi, v.weight = scattered, v.medium = collision.medium;
+    v.depth = ++state.depth;
+    visit(v, nullptr);
+    const PhaseSample s = medium.phaseAt(p).sample(wi, pair(state, sampler));
+    state.at = {{p, s.wi}, media, 0};
+    return survives(state, scattered * (s.value / s.pdf), sampler);
+  }
+
+  template <class Visit>
+  VIRGA_HD bool scatterOnSurface(State& state, const MediaState& media, const RayHit& hit, Sampler& sampler,
+                                 Visit& visit) const {
+    const SurfacePoint point = surfacePoint(scene_.surfaces[hit.shape], state.at.ray, hit, scene_.scale);
+    const Vec3 wi = -state.at.ray.d;
+    Bsdf textured;
+    const Side side = sideOf(scene_, point, hit, wi, textured);
+    const bool specular = side.bsdf->specular();
+    if (side.leaks(wi, side.wo)) return false;
+    const float arrival = std::fabs(dot(wi, point.geometricNormal));
+    if (side.bsdf->broad()) {
+      const SurfaceScattering scattering(side);
+      LightVertex v;
+      v.kind = VertexKind::surface, v.p = point.p, v.wi = wi, v.weight = state.flux / arrival;
+      v.depth = state.depth + 1, v.normal = point.geometricNormal;
+      visit(v, &scattering);
+    }
+    const BsdfSample s = side.bsdf->sample(side.wo, pair(state, sampler), one(state, sampler));
+    if (!(s.pdf > 0) || isBlack(s.weight)) return false;
+    const Vec3 w = side.frame.toWorld(s.wi);
+    if (side.leaks(w, s.wi)) return false;
+    const bool passes = side.bsdf->isThin() && s.wi.z * side.wo.z < 0;
+    state.at = leaveSurface(scene_, point, wi, w, media);
+    // The bsdf's sample is that of radiance, which refraction scales and which knows the shading normal's cosine alone.
+    Rgb next = state.flux * s.weight * square(s.eta);
+    if (!specular) next *= std::fabs(side.wo.z * dot(w, point.geometricNormal) / (s.wi.z * arrival));
+    if (passes) {
+      state.flux = next;
+      return true;
+    }
+    ++state.depth;
+    return survives(state, next, sampler);
+  }
+
+  /// Russian roulette by what scattering has left of the flux.
+  VIRGA_HD bool survives(State& state, Rgb next, Sampler& sampler) const {
+    const float q = std::min(maxComponent(next) / maxComponent(state.flux), mostSurvival(state.depth));
+    if (!(sampler.random() < q)) return false;
+    state.flux = next / q;
+    return true;
+  }
+
+  const SceneView& scene_;
+  const Rays& rays_;
+  int maxDepth_;
+};
+
+}  // namespace virga

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "transport/virtual_lights.h"
+
+#include <algorithm>
+
+#include "core/parallel.h"
+#include "transport/emitted_ray.h"
+
+namespace virga {
+namespace {
+
+// A medium that the sensor declares and in whose shape it does not lie has no end: it is around everything.
+int endlessMedium(const Scene& scene) {
+  const int declared = scene.view.cameraMedia.base();
+  if (declared == MediaState::kNone) return declared;
+  const MediaState around = mediaAt(scene, scene.view.cameraMediaPoint);
+  for (int i = 0; i < around.count(); ++i)
+    if (around.medium(i) == declared) return MediaState::kNone;
+  return declared;
+}
+
+// Walks are traced in blocks, each into a list of its own; the lists are joined in order.
+constexpr int kBlock = 64;
+
+VirtualLights traceBlock(const Scene& scene, const WalkStarts& starts, const WalkOptions& options, const SampleId& id,
+                         int first, int end) {
+  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  const LightWalker<EmbreeRays> walker(scene.view, rays, options.maxDepth);
+  VirtualLights block;
+  for (int w = first; w < end; ++w) {
+    block.firstOf.push_back(static_cast<uint32_t>(block.lights.size()));
+    Sampler sampler(SampleId{id.seed, id.replicate, static_cast<uint32_t>(w), id.index});
+    const WalkStarts::Start start = starts.sample(sampler);
+    walker.walk(start.at, start.flux, sampler, [&](LightVertex v, const SurfaceScattering* surface) {
+      if (surface) {
+        v.surface = static_cast<int>(block.surfaces.size());
+        block.surfaces.push_back(*surface);
+      }
+      block.lights.push_back(v);
+    });
+  }
+  return block;
+}
+
+void append(VirtualLights& all, const VirtualLights& block) {
+  const auto lights = static_cast<uint32_t>(all.lights.size());
+  const int surfaces = static_cast<int>(all.surfaces.size());
+  for (const uint32_t first : block.firstOf) all.firstOf.push_back(first + lights);
+  for (LightVertex v : block.lights) {
+    if (v.surface >= 0) v.surface += surfaces;
+    all.lights.push_back(v);
+  }
+  all.surfaces.insert(all.surfaces.end(), block.surfaces.begin(), block.surfaces.end());
+}
+
+}  // namespace
+
+WalkStarts::WalkStarts(const Scene& scene) : scene_(scene), endless_(endlessMedium(scene)) {}
+
+MediaState WalkStarts::mediaAround(Vec3 p) const {
+  MediaState media = mediaAt(scene_, p);
+  if (media.vacuum()) media.setBase(endless_);
+  return media;
+}
+
+WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
+  const SceneView& view = scene_.view;
+  if (view.emitters.size == 0 || !(view.emitterChoice.cdf[view.emitters.size] > 0)) return {};
+  const auto choice = view.emitterChoice.sample(sampler.next1D());
+  const EmitterView& emitter = view.emitters[choice.index];
+  const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();
+  const EmittedRay emitted = sampleEmittedRay(view, emitter, uPosition, uDirection);
+  if (isBlack(emitted.flux)) return {};
+  const Start start{{emitted.ray, mediaAround(emitted.ray.o), 0}, emitted.flux / choice.probability};
+  // Light from infinity does not get through fog that has no end.
+  if (emitter.infinite() && !start.at.media.vacuum()) return {};
+  return start;
+}
+
+VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id) {
+  const int blocks = (options.walks + kBlock - 1) / kBlock;
+  const WalkStarts starts(scene);
+  std::vector<VirtualLights> parts(static_cast<size_t>(blocks));
+  parallelFor(blocks, 1, [&](int64_t b) {
+    const int first = static_cast<int>(b) * kBlock;
+    parts[static_cast<size_t>(b)] =
+        traceBlock(scene, starts, options, id, first, std::min(first + kBlock, options.walks));
+  });
+  VirtualLights all;
+  for (const VirtualLights& part : parts) append(all, part);
+  all.firstOf.push_back(static_cast<uint32_t>(all.lights.size()));
+  return all;
+}
+
+}  // namespace virga

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "scene/scene.h"
+#include "transport/light_walk.h"
+
+namespace virga {
+
+/// Virtual point lights: where random walks from the lights scatter, walk after walk.
+struct VirtualLights {
+  std::vector<LightVertex> lights;
+  std::vector<SurfaceScattering> surfaces;  ///< LightVertex::surface counts these
+  std::vector<uint32_t> firstOf;            ///< of each walk, the first of its lights; one more entry than walks
+
+  int walks() const { return static_cast<int>(firstOf.size()) - 1; }
+};
+
+struct WalkOptions {
+  int walks = 1024;
+  int maxDepth = -1;  ///< scattering events; -1: no limit
+};
+
+/// Walks number 0, 1, ... of a scene, the same for every number of threads. `id` names the set: its stream is not used,
+/// each walk has one of its own, so that the same walk in two sets of one replicate takes part in one low-discrepancy
+/// sequence. The flux of a vertex is that of its walk: divide by the number of walks.
+VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id);
+
+/// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
+class WalkStarts {
+ public:
+  explicit WalkStarts(const Scene& scene);
+
+  struct Start {
+    MediaRay at;
+    Rgb flux;  ///< [W]; black if no walk leaves
+  };
+  Start sample(Sampler& sampler) const;
+
+ private:
+  MediaState mediaAround(Vec3 p) const;
+
+  const Scene& scene_;
+  int endless_;  ///< index of the medium that is around everything, or MediaState::kNone
+};
+
+}  // namespace virga
