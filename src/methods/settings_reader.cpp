@@ -39,6 +39,14 @@ std::optional<float> SettingsReader::number(std::string_view name, float above) 
   return value;
 }
 
+std::optional<int> SettingsReader::choice(std::string_view name, std::span<const std::string_view> words) const {
+  const std::string* text = find(name);
+  if (!text) return {};
+  const auto it = std::find(words.begin(), words.end(), *text);
+  if (it != words.end()) return static_cast<int>(it - words.begin());
+  fail(name, "one of " + joined({words.begin(), words.end()}));
+}
+
 std::optional<bool> SettingsReader::boolean(std::string_view name) const {
   const std::string* text = find(name);
   if (!text) return {};

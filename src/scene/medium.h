@@ -39,6 +39,11 @@ struct MediumView {
     if (!densityColors.values) return spectrum * (sigmaT * density.lookup(q));
     return density.supports(q) ? spectrum * densityColors.lookup(q) * sigmaT : Rgb();
   }
+  /// Mean of sigma_t over the channels and the cell of the downsampled grid that p lies in [1/unit].
+  VIRGA_HD float localMeanSigmaT(Vec3 p) const {
+    const float unit = sigmaT * (spectrum.r + spectrum.g + spectrum.b) / 3;
+    return homogeneous ? unit : unit * density.localMean(worldToDensity.point(p));
+  }
   VIRGA_HD Rgb albedoAt(Vec3 p) const { return albedoGrid.values ? albedoGrid.lookup(worldToAlbedo.point(p)) : albedo; }
   VIRGA_HD PhaseFunction phaseAt(Vec3 p) const {
     return phaseBlends.size == 0 ? phase : PhaseFunction(phaseBlends.at(p, *phase.get<PhaseMixture>()));

@@ -61,6 +61,9 @@ VIRGA_HD inline float geometryTerm(Vec3 x, Vec3 normalX, Vec3 y, Vec3 normalY) {
   return generalCosine(normalX, w) * generalCosine(normalY, w) / d2;
 }
 
+/// The part of a geometry term that min(g, bound) takes away: max(0, g - bound) / g.
+VIRGA_HD inline float clampedShareOf(float g, float bound) { return g > bound ? 1 - bound / g : 0; }
+
 /// What light from `wi` adds toward `to`, and the density [1/sr] with which a path that comes from `to` goes on to wi.
 struct Scattering {
   Rgb value;      ///< albedo times phase function, or bsdf times |cosine of wi| [1/sr]
@@ -116,6 +119,23 @@ struct Vertex {
   }
   /// Geometric; 0 in a medium.
   VIRGA_HD Vec3 normal() const { return kind == VertexKind::surface ? point.geometricNormal : Vec3(0); }
+  struct Direction {
+    Vec3 wi;
+    Rgb weight;     ///< scattering(wi).value over its pdf
+    float pdf = 0;  ///< [1/sr]; 0: the path ends here
+    float eta = 1;  ///< as in BsdfSample
+  };
+  /// Chooses where a path goes on.
+  VIRGA_HD Direction sample(Vec2 u, float choice) const {
+    if (kind == VertexKind::medium) {
+      const PhaseSample s = phase.sample(wo, u);
+      return {s.wi, albedo * (s.value / s.pdf), isBlack(albedo) ? 0 : s.pdf, 1};
+    }
+    const BsdfSample s = surface.bsdf.sample(surface.frame.toLocal(wo), u, choice);
+    const Vec3 wi = surface.frame.toWorld(s.wi);
+    const bool ends = !(s.pdf > 0) || isBlack(s.weight) || dot(wi, surface.normal) * s.wi.z <= 0;
+    return {wi, s.weight, ends ? 0 : s.pdf, s.eta};
+  }
   /// The ray from here toward wi.
   VIRGA_HD MediaRay leave(const SceneView& scene, Vec3 wi) const {
     if (kind == VertexKind::medium) return {{p, wi}, media, 0};

@@ -79,6 +79,12 @@ struct CoarseGridView {
                       static_cast<size_t>(nx) +
                   static_cast<size_t>(i)];
   }
+  /// Of the cell that holds p, or is nearest to it.
+  VIRGA_HD float cellAt(Vec3 p) const {
+    const auto index = [](float x, int n) { return static_cast<int>(clamp(x, 0, static_cast<float>(n - 1))); };
+    return cell(index((p.x - origin.x) / cellSize.x, nx), index((p.y - origin.y) / cellSize.y, ny),
+                index((p.z - origin.z) / cellSize.z, nz));
+  }
 };
 
 /// A scalar field: trilinear inside its support, `background` outside it.
@@ -102,6 +108,10 @@ struct GridView {
   VIRGA_HD float lookup(Vec3 p) const {
     if (kind == Kind::constant || !supports(p)) return background;
     return lookupInside(p);
+  }
+  /// Mean over the coarse cell that p lies in.
+  VIRGA_HD float localMean(Vec3 p) const {
+    return kind == Kind::constant || !supports(p) ? background : mean.cellAt(p);
   }
   /// Value at index coordinates p inside the support of a dense or sparse grid.
   VIRGA_HD float lookupInside(Vec3 p) const {

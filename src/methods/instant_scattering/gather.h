@@ -6,10 +6,17 @@
 
 namespace virga {
 
+/// How many virtual lights light a vertex: all of those of some walks, or single ones, whatever their walk.
+struct GatherAmount {
+  int walks = 0;   ///< P; 0: single lights
+  int lights = 4;  ///< if single
+};
+
 struct GatherOptions {
-  float bound = 0;    ///< b of the clamped geometry term [1/unit^2], > 0
-  int lights = 4;     ///< virtual lights that light a vertex
-  int maxDepth = -1;  ///< of whole paths, in segments; -1: no limit
+  float bound = 0;         ///< b of the clamped geometry term [1/unit^2], > 0
+  int maxDepth = -1;       ///< of whole paths, in segments; -1: no limit
+  bool visibility = true;  ///< false: light passes surfaces
+  bool lostLight = false;  ///< what clamping takes, max(0, G - b), in place of what it leaves
 };
 
 /// Light of virtual lights at a vertex of an eye path: equation 8 of the paper with the clamped term min(G, b).
@@ -22,28 +29,40 @@ class Gatherer {
   VIRGA_HD Gatherer(const SceneView& scene, const Rays& rays, const VirtualLights& lights, const GatherOptions& options)
       : scene_(scene), rays_(rays), lights_(lights), options_(options) {}
 
+  VIRGA_HD float bound() const { return options_.bound; }
+
   /// Adds to the path's radiance. `at` is the last vertex of its layers; `events` is how many came before it.
-  VIRGA_HD void gather(const Record& at, int events, Path& path, Sampler& sampler) const {
-    const auto all = static_cast<float>(lights_.lights.size());
-    if (!(all > 0)) return;
-    const auto count = static_cast<float>(options_.lights);
-    const float share = all / (count * static_cast<float>(lights_.walks()));
+  VIRGA_HD void gather(const Record& at, int events, Path& path, const GatherAmount& amount, float bound,
+                       Sampler& sampler) const {
+    if (lights_.lights.empty()) return;
+    const int all = amount.walks > 0 ? lights_.walks() : static_cast<int>(lights_.lights.size());
+    const int count = amount.walks > 0 ? std::min(amount.walks, all) : amount.lights;
+    // One of each of as many equal parts of the list: neighbours in it are of one walk.
+    const float share = static_cast<float>(all) / static_cast<float>(count) / static_cast<float>(lights_.walks());
     const float start = sampler.random();
-    for (int j = 0; j < options_.lights; ++j) {
-      const float place = (static_cast<float>(j) + start) / count * all;
-      const LightVertex& light = lights_.lights[std::min(static_cast<size_t>(place), lights_.lights.size() - 1)];
-      if (options_.maxDepth >= 0 && events + 2 + light.depth > options_.maxDepth) continue;
-      const Rgb found = from(light, at, sampler);
-      if (isBlack(found)) continue;
-      LayerPath layers = path.layers;
-      layers.scatter(light.kind);
-      path.radiance.add(layers.layer(), found * share);
+    for (int j = 0; j < count; ++j) {
+      const float place = (static_cast<float>(j) + start) / static_cast<float>(count) * static_cast<float>(all);
+      const auto i = static_cast<size_t>(std::min(static_cast<int>(place), all - 1));
+      if (amount.walks == 0)
+        add(lights_.lights[i], at, events, path, share, bound, sampler);
+      else
+        for (size_t l = lights_.firstOf[i]; l < lights_.firstOf[i + 1]; ++l)
+          add(lights_.lights[l], at, events, path, share, bound, sampler);
     }
   }
 
  private:
+  VIRGA_HD void add(const LightVertex& light, const Record& at, int events, Path& path, float share, float bound,
+                    Sampler& sampler) const {
+    if (options_.maxDepth >= 0 && events + 2 + light.depth > options_.maxDepth) return;
+    const Rgb found = from(light, at, bound, sampler);
+    if (isBlack(found)) return;
+    LayerPath layers = path.layers;
+    layers.scatter(light.kind);
+    path.radiance.add(layers.layer(), found * share);
+  }
   /// What one walk's light adds, as if there were no other walks.
-  VIRGA_HD Rgb from(const LightVertex& light, const Record& at, Sampler& sampler) const {
+  VIRGA_HD Rgb from(const LightVertex& light, const Record& at, float bound, Sampler& sampler) const {
     const Vertex& x = at.vertex;
     const Vec3 way = light.p - x.p;
     const float d2 = lengthSquared(way);
@@ -52,11 +71,12 @@ class Gatherer {
     const float cosine = generalCosine(light.normal, w), g = cosine * generalCosine(x.normal(), w) / d2;
     if (!(g > 0)) return {};
     // The vertex's own cosine is in its scattering: for shading normals it differs from that of the geometry.
-    const float clamped = cosine / d2 * std::min(1.f, options_.bound / g);
+    const float lost = clampedShareOf(g, bound);
+    const float clamped = cosine / d2 * (options_.lostLight ? lost : 1 - lost);
     const Rgb value = at.throughput * x.scattering(w).value * emitted(light, -w) * clamped;
     if (isBlack(value)) return {};
     ConnectingRay ray = aimAt(scene_, x.leave(scene_, w), light.p);
-    if (rays_.occluded(ray.at.ray, ray.tMax)) return {};
+    if (options_.visibility && rays_.occluded(ray.at.ray, ray.tMax)) return {};
     return value * passMedia(scene_, rays_, ray.at, ray.tMax, sampler.stream());
   }
   /// Intensity toward w, the cosine at a surface left out [W/sr].

@@ -75,6 +75,9 @@ class PathTracer {
     return path.radiance;
   }
 
+  /// May light still be connected after one more scattering event than these?
+  VIRGA_HD bool mayScatter(int events) const { return options_.maxDepth < 0 || events + 2 <= options_.maxDepth; }
+
   VIRGA_HD Path start(const CameraRay& camera) const {
     Path path;
     path.at = leaveCamera(scene_, camera.ray);
@@ -113,6 +116,22 @@ class PathTracer {
     return false;
   }
 
+  /// Scatters at a vertex that was found some other way, of which `record` shall not hear; false at the end of the
+  /// path.
+  VIRGA_HD bool scatterAt(Path& path, const Vertex& v, Sampler& sampler) const {
+    path.link = {true, v.p, v.normal()};
+    if (v.kind == VertexKind::medium) {
+      path.throughput *= v.albedo;
+      return leaveMedium(path, v.phase, v.media, v.p, v.wo, {v.p, 0, true, 0, {}}, sampler);
+    }
+    const Side side{&v.surface.bsdf, v.surface.frame, v.surface.frame.toLocal(v.wo), v.surface.normal};
+    path.at.ray.d = -v.wo;
+    path.layers.scatter(VertexKind::surface);
+    connectSurface(path, v.point, side, v.media, sampler);
+    const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    return leave(path, v.point, side, s, v.media, sampler);
+  }
+
  private:
   /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
   static constexpr int kStratifiedBounces = 4;
@@ -126,10 +145,7 @@ class PathTracer {
   VIRGA_HD static float weight(float own, float other, float third = 0) {
     return own > 0 ? 1 / (1 + square(other / own) + square(third / own)) : 0;
   }
-  /// May light still be connected after one more scattering event?
-  VIRGA_HD bool mayScatter(const Path& path) const {
-    return options_.maxDepth < 0 || path.depth + 2 <= options_.maxDepth;
-  }
+  VIRGA_HD bool mayScatter(const Path& path) const { return mayScatter(path.depth); }
 
   // --- what virtual lights have left (ims) ---
 
@@ -137,8 +153,7 @@ class PathTracer {
   /// vertex: max(0, G - b) / G; all of it where none were gathered.
   VIRGA_HD static float clampedShare(const Path& path, Vec3 x, Vec3 normal) {
     if (!path.link.active) return 1;
-    const float g = geometryTerm(path.link.p, path.link.normal, x, normal);
-    return g > path.bound ? 1 - path.bound / g : 0;
+    return clampedShareOf(geometryTerm(path.link.p, path.link.normal, x, normal), path.bound);
   }
   VIRGA_HD static bool survivesClamping(const Path& path, Vec3 x, Vec3 normal, Sampler& sampler) {
     const float q = clampedShare(path, x, normal);
@@ -313,11 +328,17 @@ class PathTracer {
     if (!survivesClamping(path, x, Vec3(0), sampler)) return false;
     if (path.record) record(path, Vertex::inMedium(scene_, collision.medium, x, wo, media));
     path.throughput *= medium.albedoAt(x);
+    LastVertex last{x, 0, true, collision.t, {}};
+    if (segment.contains(collision.t) && collision.medium == segment.medium) last.segment = segment;
+    return leaveMedium(path, medium.phaseAt(x), media, x, wo, last, sampler);
+  }
+
+  /// Connects the lights at a vertex in a medium, and goes on from it.
+  VIRGA_HD bool leaveMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
+                            const LastVertex& last, Sampler& sampler) const {
     if (isBlack(path.throughput)) return false;
     path.layers.scatter(VertexKind::medium);
-    path.last = {x, 0, true, collision.t, {}};
-    if (segment.contains(collision.t) && collision.medium == segment.medium) path.last.segment = segment;
-    const PhaseFunction phase = medium.phaseAt(x);
+    path.last = last;
     connectMedium(path, phase, media, x, wo, sampler);
 
     const PhaseSample s = phase.sample(wo, pair(path, sampler));

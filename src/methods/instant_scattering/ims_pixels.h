@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "methods/instant_scattering/ims_options.h"
+
+namespace virga {
+
+/// Samples of pixels, lit by one set of virtual lights (`exact`): eye paths that gather at each vertex that can be
+/// connected to. The scene and the lights must outlive it.
+class ImsPixels {
+ public:
+  ImsPixels(const Scene& scene, const VirtualLights& lights, const ImsOptions& options)
+      : scene_(scene),
+        rays_{*scene.surfaceRays, *scene.boundaryRays},
+        options_(options),
+        tracer_(scene_.view, rays_, options_.path),
+        gatherer_(scene_.view, rays_, lights, options_.gather),
+        compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation) {}
+  ImsPixels(const ImsPixels&) = delete;
+  ImsPixels& operator=(const ImsPixels&) = delete;
+
+  /// (x, y): a pixel of the crop window. Safe to call from many threads.
+  LayerRadiance sample(int x, int y, const SampleId& id) const {
+    if (options_.path.maxDepth == 0) return {};
+    Sampler sampler(id);
+    const Vec2 offset = scene_.filter.sample(sampler.next2D());
+    Tracer::Path path = tracer_.start(
+        scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y));
+    Tracer::Record record;
+    path.record = &record;
+    // The path finds what clamping takes, or nothing of what virtual lights could light.
+    const bool compensates =
+        options_.compensate == ImsOptions::Compensate::path && options_.show == ImsOptions::Show::picture;
+    path.bound = compensates ? options_.gather.bound : kInfinity;
+    for (bool goesOn = true; goesOn;) {
+      record.vertex.kind = VertexKind::none;
+      const int events = path.depth;
+      const LayerRadiance before = path.radiance;
+      goesOn = tracer_.extend(path, sampler);
+      if (options_.show != ImsOptions::Show::picture) path.radiance = before;  // no light straight from lamps
+      if (record.vertex.kind != VertexKind::none) lightVertex(record, events, path, sampler);
+    }
+    return path.radiance;
+  }
+
+ private:
+  using Tracer = PathTracer<EmbreeRays>;
+
+  void lightVertex(const Tracer::Record& at, int events, Tracer::Path& path, Sampler& sampler) const {
+    if (options_.show != ImsOptions::Show::compensation)
+      gatherer_.gather(at, events, path, options_.amount, gatherer_.bound(), sampler);
+    if (options_.show != ImsOptions::Show::lost && options_.compensate == ImsOptions::Compensate::sampled)
+      compensation_.compensate(at, path.layers, events, path.radiance, sampler);
+  }
+
+  const Scene& scene_;
+  EmbreeRays rays_;
+  ImsOptions options_;
+  Tracer tracer_;                          ///< refers to the members above
+  Gatherer<EmbreeRays> gatherer_;          ///< likewise
+  Compensation<EmbreeRays> compensation_;  ///< likewise
+};
+
+}  // namespace virga
