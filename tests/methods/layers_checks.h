@@ -9,7 +9,7 @@
 #include "methods/rendering.h"
 
 /// Layer by layer against an independent estimator. Pixels of both are independent, so their differences are, too:
-/// t-tests of the mean difference over quarters of the picture, channel by channel.
+/// t-tests of the mean difference over the picture and its quarters, channel by channel.
 namespace virga::testing {
 
 using Picture = std::vector<brute::Layers>;
@@ -24,7 +24,7 @@ struct Effort {
 
 /// What two pictures say about one layer.
 struct Finding {
-  double p = 1;          ///< of the worst of twelve tests, times twelve
+  double p = 1;          ///< of the worst of fifteen tests, times fifteen
   double level = 0;      ///< mean over the picture
   double precision = 0;  ///< standard error of the mean difference, relative to the level
 };
@@ -36,18 +36,24 @@ Picture pictureByPath(const std::string& elements, uint64_t seed = 1, int passes
 /// The world in a scene file; its grids are written beside it, under the name of the test.
 std::string elementsOf(const brute::World& world);
 
-/// A layer that is to be there, and to what precision it is compared: a deviation of five times that would be noticed.
+inline constexpr double kNoticed = 7;
+
+/// A layer that is to be there, and to what precision it is compared: kNoticed times that, over all of the picture, is
+/// seen to be noticed.
 struct Power {
   Layer layer;
   double precision;
 };
 
-/// A world of which one parameter is wrong, and a layer by which the same test has to notice.
+/// A world of which one parameter is wrong, and layers in each of which the same test has to notice.
 struct Control {
   const char* wrong;
-  Layer layer;
+  std::vector<Layer> layers;
   std::function<void(brute::World&)> spoil;
 };
+
+/// The same picture with one layer times a factor.
+Picture brighter(Picture picture, Layer layer, double factor);
 
 enum class Compare { all, notEmission };
 
