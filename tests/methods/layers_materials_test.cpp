@@ -143,6 +143,20 @@ TEST(LayersOfMaterials, Panes) {
       {.passes = 640, .samples = 4500});
 }
 
+// If a pane that light goes straight through ended a segment, nothing would be left behind it.
+TEST(LayersOfMaterials, PanesEndNoSegment) {
+  World world = panesInFog();
+  world.maxDepth = 2;
+  expectAgreement(world,
+                  {{Layer::emission, 0.01},
+                   {Layer::directMedia, 0.01},
+                   {Layer::causticSurface, 0.02},
+                   {Layer::causticMedia, 0.015}},
+                  {{"a segment less", {Layer::causticSurface, Layer::causticMedia}, [](World& w) { w.maxDepth = 1; }},
+                   {"a segment more", {Layer::mediaToMedia}, [](World& w) { w.maxDepth = 3; }}},
+                  {.passes = 320, .samples = 2000});
+}
+
 // --- boards ---
 
 /// A floor and a wall whose squares are not square, so that neither may be turned.
