@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 
@@ -18,30 +19,48 @@ std::string point(const char* name, Vector v) {
 
 bool shines(Vector v) { return v.x > 0 || v.y > 0 || v.z > 0; }
 
-std::string bsdf(const Material& m) {
-  std::string inner;
+std::string colour(const char* name, Vector v) { return fmt::format(R"(<rgb name="{}" value="{}"/>)", name, text(v)); }
+std::string number(const char* name, double v) { return fmt::format(R"(<float name="{}" value="{}"/>)", name, v); }
+std::string element(const char* type, const std::string& inner) {
+  return fmt::format(R"(<bsdf type="{}">{}</bsdf>)", type, inner);
+}
+
+std::string reflectance(const Material& m) {
+  if (m.board.u == 0) return colour("reflectance", m.diffuse);
+  return fmt::format(R"(<texture name="reflectance" type="checkerboard">{}{}<transform name="to_uv">
+    <scale x="{}" y="{}"/></transform></texture>)",
+                     colour("color0", m.diffuse), colour("color1", m.board.other), m.board.u, m.board.v);
+}
+std::string indices(const Material& m) { return number("int_ior", m.index) + number("ext_ior", 1); }
+std::string facets(const Material& m) {
+  const char* name = m.facets == Material::Facets::ggx ? "ggx" : "beckmann";
+  return fmt::format(R"(<string name="distribution" value="{}"/>)", name) + number("alpha", m.alpha);
+}
+
+std::string oneSided(const Material& m) {
   switch (m.kind) {
-    case Material::Kind::diffuse:
-      inner = fmt::format(R"(<bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf>)", text(m.diffuse));
-      break;
     case Material::Kind::phong:
-      inner = fmt::format(R"(<bsdf type="phong"><rgb name="diffuse_reflectance" value="{}"/>
-        <rgb name="specular_reflectance" value="{}"/><float name="exponent" value="{}"/></bsdf>)",
-                          text(m.diffuse), text(m.specular), m.exponent);
-      break;
+      return element("phong", colour("diffuse_reflectance", m.diffuse) + colour("specular_reflectance", m.specular) +
+                                  number("exponent", m.exponent));
     case Material::Kind::mirror:
-      inner = fmt::format(R"(<bsdf type="conductor"><string name="material" value="none"/>
-        <rgb name="specular_reflectance" value="{}"/></bsdf>)",
-                          text(m.specular));
-      break;
+      return element("conductor",
+                     R"(<string name="material" value="none"/>)" + colour("specular_reflectance", m.specular));
     case Material::Kind::glass:
-      inner = fmt::format(
-          R"(<bsdf type="dielectric"><float name="int_ior" value="{}"/><float name="ext_ior" value="1"/></bsdf>)",
-          m.index);
+      return element("dielectric", indices(m));
+    case Material::Kind::pane:
+      return element("thindielectric", indices(m));
+    case Material::Kind::roughMetal:
+      return element("roughconductor",
+                     facets(m) + colour("eta", m.eta) + colour("k", m.k) + colour("specular_reflectance", m.specular));
+    case Material::Kind::roughGlass:
+      return element("roughdielectric", facets(m) + indices(m));
+    case Material::Kind::diffuse:
       break;
   }
-  return m.twoSided ? "<bsdf type=\"twosided\">" + inner + "</bsdf>" : inner;
+  return element("diffuse", reflectance(m));
 }
+
+std::string bsdf(const Material& m) { return m.twoSided ? element("twosided", oneSided(m)) : oneSided(m); }
 
 std::string look(const Material& m) {
   if (!shines(m.emission)) return bsdf(m);
@@ -88,35 +107,74 @@ std::string gridVolume(const char* parameter, const Region& r, const std::string
       parameter, file, text({r.hi.x - r.lo.x, r.hi.y - r.lo.y, r.hi.z - r.lo.z}), text(r.lo));
 }
 
-std::string phase(const Medium& m) {
-  if (m.phase == Medium::Phase::isotropic) return "<phase type=\"isotropic\"/>";
-  return fmt::format(R"(<phase type="{}"><float name="g" value="{}"/></phase>)",
-                     m.phase == Medium::Phase::henyeyGreenstein ? "hg" : "cornette_shanks", m.g);
+std::string phase(const Lobe& lobe) {
+  switch (lobe.phase) {
+    case Phase::isotropic:
+      return R"(<phase type="isotropic"/>)";
+    case Phase::henyeyGreenstein:
+      return fmt::format(R"(<phase type="hg">{}</phase>)", number("g", lobe.g));
+    case Phase::cornetteShanks:
+      return fmt::format(R"(<phase type="cornette_shanks">{}</phase>)", number("g", lobe.g));
+    case Phase::rayleigh:
+      return R"(<phase type="rayleigh"/>)";
+    case Phase::schlick:
+      return fmt::format(R"(<phase type="schlick">{}</phase>)", number("k", lobe.g));
+    case Phase::table:
+      break;
+  }
+  return fmt::format(R"(<phase type="tabphase"><string name="values" value="{}"/></phase>)",
+                     fmt::join(lobe.table, ", "));
 }
 
-std::string medium(const Region& r, int index, const std::string& directory, const std::string& name) {
-  const Medium& m = r.medium;
-  const bool grids = m.density.n > 0 || m.albedoGrid.n > 0;
-  std::string sigmaT = R"(<float name="sigma_t" value="1"/>)",
-              albedo = fmt::format(R"(<rgb name="albedo" value="{}"/>)", text(m.albedo));
-  const auto volume = [&](const char* parameter, const Grid& grid, int channels) {
-    const std::string file = fmt::format("{}-{}-{}.vol", name, index, parameter);
-    writeGrid(std::filesystem::path(directory) / file, grid, channels);
-    return gridVolume(parameter, r, file);
-  };
-  if (m.density.n > 0) sigmaT = volume("sigma_t", m.density, 1);
-  if (m.albedoGrid.n > 0) albedo = volume("albedo", m.albedoGrid, 3);
-  return fmt::format(R"(<medium type="{}" id="medium{}">{}{}<float name="scale" value="{}"/>{}</medium>)",
-                     grids ? "heterogeneous" : "homogeneous", index, sigmaT, albedo, m.sigmaT, phase(m)) +
-         "\n";
-}
+/// Writes the grids of a region's medium and the elements that refer to them.
+class MediumText {
+ public:
+  MediumText(const Region& r, int index, const std::string& directory, const std::string& name)
+      : region_(r), index_(index), directory_(directory), name_(name) {}
+
+  std::string text() const {
+    const Medium& m = region_.medium;
+    const bool grids = m.density.n > 0 || m.albedoGrid.n > 0 || m.emissionGrid.n > 0;
+    return fmt::format(R"(<medium type="{}" id="medium{}">)", grids ? "heterogeneous" : "homogeneous", index_) +
+           volumeOr(number("sigma_t", 1), "sigma_t", m.density) + colour("scale", m.spectrum * m.sigmaT) +
+           volumeOr(colour("albedo", m.albedo), "albedo", m.albedoGrid) + emission() + phases() + "</medium>\n";
+  }
+
+ private:
+  std::string volumeOr(const std::string& constant, const char* parameter, const Grid& grid) const {
+    if (grid.n == 0) return constant;
+    const std::string file = fmt::format("{}-{}-{}.vol", name_, index_, parameter);
+    const bool grey =
+        std::all_of(grid.values.begin(), grid.values.end(), [](Vector v) { return v.x == v.y && v.y == v.z; });
+    const bool albedo = std::string_view(parameter) == "albedo";
+    writeGrid(std::filesystem::path(directory_) / file, grid, grey && !albedo ? 1 : 3);
+    return gridVolume(parameter, region_, file);
+  }
+  std::string emission() const {
+    const Medium& m = region_.medium;
+    if (!shines(m.emission)) return "";
+    if (m.emissionGrid.n == 0) return colour("emission", m.emission);
+    return volumeOr("", "emission", m.emissionGrid) + colour("emission_scale", m.emission);
+  }
+  std::string phases() const {
+    const Medium& m = region_.medium;
+    if (m.share == 0 && m.shareGrid.n == 0) return phase(m.lobe);
+    return R"(<phase type="blendphase">)" + volumeOr(number("weight", m.share), "weight", m.shareGrid) + phase(m.lobe) +
+           phase(m.other) + "</phase>";
+  }
+
+  const Region& region_;
+  int index_;
+  const std::string& directory_;
+  const std::string& name_;
+};
 
 std::string boundary(const Region& r, int index) {
   const Vector c{(r.lo.x + r.hi.x) / 2, (r.lo.y + r.hi.y) / 2, (r.lo.z + r.hi.z) / 2};
   const Vector half{(r.hi.x - r.lo.x) / 2, (r.hi.y - r.lo.y) / 2, (r.hi.z - r.lo.z) / 2};
   std::string inner = fmt::format(R"(<ref name="interior" id="medium{}"/>)", index);
   if (r.within >= 0) inner += fmt::format(R"(<ref name="exterior" id="medium{}"/>)", r.within);
-  inner += r.form == Region::Form::glassBall ? bsdf({.kind = Material::Kind::glass}) : R"(<bsdf type="null"/>)";
+  inner += r.form == Region::Form::glassBall ? bsdf(r.wall) : R"(<bsdf type="null"/>)";
   if (r.form == Region::Form::box)
     return fmt::format(
                R"(<shape type="cube"><transform name="to_world"><scale value="{}"/><translate value="{}"/></transform>{}</shape>)",
@@ -143,7 +201,7 @@ std::string sceneElements(const World& world, const std::string& directory, cons
   for (const Sphere& s : world.spheres) xml += shape(s);
   for (const Rectangle& r : world.rectangles) xml += shape(r);
   const int count = static_cast<int>(world.regions.size());
-  for (int i = 0; i < count; ++i) xml += medium(world.regions[static_cast<size_t>(i)], i, directory, name);
+  for (int i = 0; i < count; ++i) xml += MediumText(world.regions[static_cast<size_t>(i)], i, directory, name).text();
   for (int i = 0; i < count; ++i) xml += boundary(world.regions[static_cast<size_t>(i)], i);
   return xml;
 }

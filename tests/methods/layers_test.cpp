@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Layer by layer against an independent estimator. Pixels of both are independent, so their differences are, too:
-// t-tests of the mean difference over quarters of the picture, channel by channel.
+// Worlds whose layers are held against the brute-force tracer, and lights that it cannot meet against small ones.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
-#include "methods/brute_force.h"
-#include "methods/rendering.h"
+#include "methods/layers_checks.h"
 
 namespace virga {
 namespace {
@@ -16,123 +13,12 @@ namespace {
 using namespace virga::testing;
 using brute::Grid;
 using brute::Material;
-using brute::Medium;
+using brute::Phase;
 using brute::Region;
 using brute::Vector;
 using brute::World;
 
-constexpr int kPasses = 640, kSamples = 3000;
-
-double channel(Vector v, int c) { return c == 0 ? v.x : (c == 1 ? v.y : v.z); }
-
-using Picture = std::vector<brute::Layers>;
-
-/// What two pictures say about one layer.
-struct Finding {
-  double p = 1;          ///< of the worst of twelve tests, times twelve
-  double level = 0;      ///< mean over the picture
-  double precision = 0;  ///< standard error of the mean difference, relative to the level
-};
-
-Finding compared(const Picture& picture, Layer layer, const Picture& truth, Layer truthLayer) {
-  const auto size = static_cast<size_t>(std::lround(std::sqrt(static_cast<double>(truth.size()))));
-  Finding finding;
-  stats::Moments whole;
-  for (int c = 0; c < 3; ++c) {
-    stats::Moments quarters[4];
-    for (size_t i = 0; i < truth.size(); ++i) {
-      const double t = channel(truth[i][static_cast<size_t>(truthLayer)], c);
-      const double d = channel(picture[i][static_cast<size_t>(layer)], c) - t;
-      quarters[(i % size >= size / 2 ? 1 : 0) + (i / size >= size / 2 ? 2 : 0)].add(d);
-      whole.add(d);
-      finding.level += t / static_cast<double>(3 * truth.size());
-    }
-    for (const stats::Moments& q : quarters) finding.p = std::min(finding.p, 12 * stats::oneSampleTest(q, 0));
-  }
-  // The channels share their paths: they count once.
-  finding.precision = finding.level > 0 ? whole.standardError() * std::sqrt(3.0) / finding.level : 0;
-  return finding;
-}
-Finding compared(const Picture& picture, const Picture& truth, Layer layer) {
-  return compared(picture, layer, truth, layer);
-}
-
-Picture pictureByPath(const std::string& elements, uint64_t seed = 1) {
-  const RenderSession session =
-      rendered(sceneOf(elements, ::testing::TempDir()), {.passes = kPasses, .seed = seed, .layers = LayerMask::all()});
-  Picture picture(static_cast<size_t>(session.film().width() * session.film().height()));
-  for (size_t l = 0; l < kLayerCount; ++l) {
-    const Image image = session.film().layer(static_cast<Layer>(l));
-    for (size_t i = 0; i < picture.size(); ++i)
-      picture[i][l] = {static_cast<double>(image.pixels[i].r), static_cast<double>(image.pixels[i].g),
-                       static_cast<double>(image.pixels[i].b)};
-  }
-  return picture;
-}
-
-std::string elementsOf(const World& world) {
-  return brute::sceneElements(world, ::testing::TempDir(),
-                              ::testing::UnitTest::GetInstance()->current_test_info()->name());
-}
-
-constexpr double kSuspicious = 2e-4;
-
-/// A layer that is to be there, and to what precision it is compared: a deviation of five times that would be noticed.
-struct Power {
-  Layer layer;
-  double precision;
-};
-
-void expectAgreement(const Picture& picture, const Picture& truth, const std::vector<Power>& powers,
-                     bool emission = true) {
-  for (size_t l = emission ? 0 : 1; l < kLayerCount; ++l) {
-    const Finding f = compared(picture, truth, static_cast<Layer>(l));
-    if (f.level > 0)
-      fmt::print("{:18} level {:.5f}, standard error {:.2f} %, p {:.2g}\n", kLayerNames[l], f.level, 100 * f.precision,
-                 std::min(1.0, f.p));
-    EXPECT_GT(f.p, kSuspicious) << kLayerNames[l];
-  }
-  for (const Power& power : powers) {
-    const Finding f = compared(picture, truth, power.layer);
-    EXPECT_GT(f.level, 0) << kLayerNames[static_cast<size_t>(power.layer)];
-    EXPECT_LT(f.precision, power.precision)
-        << kLayerNames[static_cast<size_t>(power.layer)] << ": too few samples to tell";
-  }
-}
-
-void expectAgreement(const World& world, const std::vector<Power>& powers) {
-  expectAgreement(pictureByPath(elementsOf(world)), brute::render(world, kSamples, 1), powers);
-}
-
 // --- worlds ---
-
-Material light(double r, double g, double b) { return {.emission = {r, g, b}}; }
-Material matt(double r, double g, double b) { return {.diffuse = {r, g, b}}; }
-
-brute::Rectangle floorAt(double y, double half, const Material& m) {
-  return {{0, y, 0}, {half, 0, 0}, {0, 0, -half}, m};
-}
-brute::Rectangle ceilingAt(double y, double half, const Material& m) {
-  return {{0, y, 0}, {half, 0, 0}, {0, 0, half}, m};
-}
-
-Grid gridOf(int n, const std::function<Vector(double, double, double)>& value) {
-  Grid grid{n, {}};
-  for (int z = 0; z < n; ++z)
-    for (int y = 0; y < n; ++y)
-      for (int x = 0; x < n; ++x) grid.values.push_back(value((x + 0.5) / n, (y + 0.5) / n, (z + 0.5) / n));
-  return grid;
-}
-
-/// A column that widens and frays as it rises; empty in the corners, densest where a noise says.
-Grid plume() {
-  std::mt19937 noise(5);
-  return gridOf(16, [&](double x, double y, double z) {
-    const double r = std::hypot(x - 0.5 - 0.1 * std::sin(6 * y), z - 0.5) / (0.12 + 0.25 * y);
-    const double d = r < 1 ? (1 - r) * (0.3 + 0.7 * static_cast<double>(noise() % 1000) / 1000) : 0;
-    return Vector{d, d, d};
-  });
-}
 
 /// A plume of smoke in the corner of a room, a lamp on the ceiling.
 World smokeInRoom() {
@@ -170,11 +56,10 @@ World forwardBall() {
   w.sky = {0.2, 0.3, 0.5};
   w.spheres = {{{0.8, 1.2, -2.5}, 0.9, light(6, 5, 4)}};
   w.rectangles = {floorAt(-1.05, 3, matt(0.5, 0.5, 0.5))};
-  w.regions = {
-      {.form = Region::Form::ball,
-       .lo = {-1, -1, -1},
-       .hi = {1, 1, 1},
-       .medium = {.sigmaT = 3, .albedo = {0.99, 0.95, 0.9}, .phase = Medium::Phase::henyeyGreenstein, .g = 0.85}}};
+  w.regions = {{.form = Region::Form::ball,
+                .lo = {-1, -1, -1},
+                .hi = {1, 1, 1},
+                .medium = {.sigmaT = 3, .albedo = {0.99, 0.95, 0.9}, .lobe = {Phase::henyeyGreenstein, 0.85}}}};
   return w;
 }
 
@@ -198,10 +83,9 @@ World glossyInFog() {
         .specular = {0.4, 0.3, 0.2},
         .exponent = 8,
         .twoSided = true}}};
-  w.regions = {
-      {.lo = {-1.8, -1, -1.5},
-       .hi = {1.8, 1.4, 1.5},
-       .medium = {.sigmaT = 0.4, .albedo = {0.9, 0.9, 0.9}, .phase = Medium::Phase::henyeyGreenstein, .g = -0.4}}};
+  w.regions = {{.lo = {-1.8, -1, -1.5},
+                .hi = {1.8, 1.4, 1.5},
+                .medium = {.sigmaT = 0.4, .albedo = {0.9, 0.9, 0.9}, .lobe = {Phase::henyeyGreenstein, -0.4}}}};
   return w;
 }
 
@@ -228,24 +112,23 @@ World overlappingMedia() {
   w.sky = {0.5, 0.6, 0.8};
   w.spheres = {{{-1.6, 1.4, 0.4}, 0.7, light(4, 3, 2)}};
   w.rectangles = {floorAt(-1, 2, matt(0.5, 0.5, 0.5))};
-  w.regions = {
-      {.lo = {-1.2, -1, -0.8}, .hi = {0.2, 0.6, 0.8}, .medium = {.sigmaT = 0.8, .albedo = {0.9, 0.5, 0.5}}},
-      {.lo = {-0.3, -0.9, -0.7},
-       .hi = {1.3, 0.3, 0.7},
-       .medium = {.sigmaT = 1.2, .albedo = {0.5, 0.9, 0.5}, .phase = Medium::Phase::henyeyGreenstein, .g = 0.5}},
-      {.form = Region::Form::ball,
-       .lo = {-0.5, -0.2, -0.6},
-       .hi = {0.7, 1, 0.6},
-       .medium = {.sigmaT = 3, .albedo = {0.6, 0.6, 0.95}, .density = plume()}},
-      {.lo = {-1.1, -0.9, -0.3},
-       .hi = {-0.6, -0.2, 0.5},
-       .medium = {.sigmaT = 5, .albedo = {0.9, 0.9, 0.2}},
-       .within = 0},
-      {.form = Region::Form::glassBall,
-       .lo = {0.6, -0.7, -0.3},
-       .hi = {1.2, -0.1, 0.3},
-       .medium = {.sigmaT = 2, .albedo = {0.9, 0.9, 0.9}},
-       .within = 1}};
+  w.regions = {{.lo = {-1.2, -1, -0.8}, .hi = {0.2, 0.6, 0.8}, .medium = {.sigmaT = 0.8, .albedo = {0.9, 0.5, 0.5}}},
+               {.lo = {-0.3, -0.9, -0.7},
+                .hi = {1.3, 0.3, 0.7},
+                .medium = {.sigmaT = 1.2, .albedo = {0.5, 0.9, 0.5}, .lobe = {Phase::henyeyGreenstein, 0.5}}},
+               {.form = Region::Form::ball,
+                .lo = {-0.5, -0.2, -0.6},
+                .hi = {0.7, 1, 0.6},
+                .medium = {.sigmaT = 3, .albedo = {0.6, 0.6, 0.95}, .density = plume()}},
+               {.lo = {-1.1, -0.9, -0.3},
+                .hi = {-0.6, -0.2, 0.5},
+                .medium = {.sigmaT = 5, .albedo = {0.9, 0.9, 0.2}},
+                .within = 0},
+               {.form = Region::Form::glassBall,
+                .lo = {0.6, -0.7, -0.3},
+                .hi = {1.2, -0.1, 0.3},
+                .medium = {.sigmaT = 2, .albedo = {0.9, 0.9, 0.9}},
+                .within = 1}};
   return w;
 }
 
@@ -262,8 +145,7 @@ World colouredCloud() {
   w.regions = {
       {.lo = {-1, -1.1, -1.2},
        .hi = {1.1, 1, 1},
-       .medium = {
-           .sigmaT = 6, .phase = Medium::Phase::cornetteShanks, .g = 0.6, .density = plume(), .albedoGrid = albedo}}};
+       .medium = {.sigmaT = 6, .lobe = {Phase::cornetteShanks, 0.6}, .density = plume(), .albedoGrid = albedo}}};
   return w;
 }
 
@@ -334,7 +216,7 @@ TEST(Layers, ColouredCloud) {
 
 TEST(Layers, WhatIsWrongIsNoticed) {
   const World world = fogInRoom();
-  const Picture truth = brute::render(world, kSamples, 1);
+  const Picture truth = brute::render(world, Effort{}.samples, 1);
   World darker = world;
   darker.regions[0].medium.albedo = world.regions[0].medium.albedo * 0.97;
   const Picture wrong = pictureByPath(elementsOf(darker)), right = pictureByPath(elementsOf(world));
@@ -366,7 +248,7 @@ TEST(Layers, PointLightIsASmallSphere) {
                    {Layer::mediaToSurface, 0.03},
                    {Layer::surfaceToMedia, 0.035},
                    {Layer::mediaToMedia, 0.02}},
-                  false);
+                  Compare::notEmission);
 }
 
 TEST(Layers, DirectionalLightIsAFarSphere) {
@@ -392,7 +274,7 @@ TEST(Layers, DirectionalLightIsAFarSphere) {
                    {Layer::mediaToSurface, 0.02},
                    {Layer::surfaceToMedia, 0.02},
                    {Layer::mediaToMedia, 0.02}},
-                  false);
+                  Compare::notEmission);
 }
 
 // A small disk shines with the cosine of the angle, and nested spots, each of which falls off between two angles, add
@@ -424,7 +306,7 @@ TEST(Layers, SpotsAreASmallDisk) {
                    {Layer::mediaToSurface, 0.02},
                    {Layer::surfaceToMedia, 0.02},
                    {Layer::mediaToMedia, 0.02}},
-                  false);
+                  Compare::notEmission);
 }
 
 }  // namespace
