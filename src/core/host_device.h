@@ -7,3 +7,14 @@
 #else
 #define VIRGA_HD
 #endif
+
+namespace virga {
+
+/// Asks for memory that is about to be read.
+VIRGA_HD inline void prefetch([[maybe_unused]] const void* p) {
+#if !defined(__CUDA_ARCH__)
+  __builtin_prefetch(p);
+#endif
+}
+
+}  // namespace virga

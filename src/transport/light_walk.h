@@ -7,16 +7,16 @@
 
 namespace virga {
 
-/// Where a walk from a light scatters.
-struct LightVertex {
+/// Where a walk from a light scatters. A cache line.
+struct alignas(64) LightVertex {
   VertexKind kind = VertexKind::none;
   Vec3 p;            ///< world
   Vec3 wi;           ///< unit, toward where the light came from
   Rgb weight;        ///< light that is scattered here, before phase function or bsdf * |cosine of wi| [W]
   int medium = -1;   ///< the one that scatters; -1 on surfaces
   int depth = 0;     ///< scattering events, this one included; specular ones count, thin glass that is passed does not
-  int surface = -1;  ///< where its SurfaceScattering is kept
-  Vec3 normal;       ///< geometric, on surfaces; 0 in media
+  int surface = -1;  ///< where its SurfaceScattering is kept; -1: it is Lambertian, with reflectance / pi in the weight
+  Vec3 normal;       ///< geometric, on the side that the light came to; 0 in media
 };
 
 /// Random walks that carry flux from the lights (methods.md 2.1; Dachsbacher et al.'s virtual point lights in media,
@@ -102,8 +102,10 @@ class LightWalker {
       const SurfaceScattering scattering(side);
       LightVertex v;
       v.kind = VertexKind::surface, v.p = point.p, v.wi = wi, v.weight = state.flux / arrival;
-      v.depth = state.depth + 1, v.normal = point.geometricNormal;
-      visit(v, &scattering);
+      v.depth = state.depth + 1, v.normal = side.normal;
+      const bool lambertian = side.bsdf->kind() == Bsdf::Kind::diffuse && point.shadingNormal == point.geometricNormal;
+      if (lambertian) v.weight *= scattering.scattering(side.normal, wi).value;
+      if (!isBlack(v.weight)) visit(v, lambertian ? nullptr : &scattering);
     }
     const BsdfSample s = side.bsdf->sample(side.wo, pair(state, sampler), one(state, sampler));
     if (!(s.pdf > 0) || isBlack(s.weight)) return false;

@@ -40,9 +40,14 @@ class Gatherer {
     // One of each of as many equal parts of the list: neighbours in it are of one walk.
     const float share = static_cast<float>(all) / static_cast<float>(count) / static_cast<float>(lights_.walks());
     const float start = sampler.random();
-    for (int j = 0; j < count; ++j) {
+    const auto pick = [&](int j) {
       const float place = (static_cast<float>(j) + start) / static_cast<float>(count) * static_cast<float>(all);
-      const auto i = static_cast<size_t>(std::min(static_cast<int>(place), all - 1));
+      return static_cast<size_t>(std::min(static_cast<int>(place), all - 1));
+    };
+    if (amount.walks == 0)
+      for (int j = 0; j < count; ++j) prefetch(&lights_.lights[pick(j)]);
+    for (int j = 0; j < count; ++j) {
+      const size_t i = pick(j);
       if (amount.walks == 0)
         add(lights_.lights[i], at, events, path, share, bound, sampler);
       else
@@ -81,6 +86,7 @@ class Gatherer {
   }
   /// Intensity toward w, the cosine at a surface left out [W/sr].
   VIRGA_HD Rgb emitted(const LightVertex& light, Vec3 w) const {
+    if (light.kind == VertexKind::surface && light.surface < 0) return dot(w, light.normal) > 0 ? light.weight : Rgb();
     if (light.kind == VertexKind::surface)
       return light.weight * lights_.surfaces[static_cast<size_t>(light.surface)].scattering(w, light.wi).value;
     return light.weight * scene_.media[light.medium].phaseAt(light.p).value(w, light.wi);
