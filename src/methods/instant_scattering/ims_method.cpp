@@ -3,6 +3,7 @@
 
 #include "core/parallel.h"
 #include "methods/instant_scattering/ims_pixels.h"
+#include "methods/instant_scattering/upsampling.h"
 
 namespace virga {
 namespace {
@@ -18,6 +19,7 @@ class ImsMethod final : public Method {
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
     scene_ = std::move(next);
+    upsampling_ = nullptr;
     refuse();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
@@ -32,14 +34,11 @@ class ImsMethod final : public Method {
         *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
         {seed_ ^ kWalkSeed, replicate, 0, sample});
     const ImsPixels pixels(*scene_, lights, options);
-    constexpr int kTile = 16;
-    const int tilesX = (frame.width() + kTile - 1) / kTile, tilesY = (frame.height() + kTile - 1) / kTile;
-    parallelFor(int64_t{tilesX} * tilesY, 1, [&](int64_t tile) {
-      const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
-      for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
-        for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x)
-          frame.set(x, y, pixels.sample(x, y, {seed_, replicate, scene_->camera.pixelStream(x, y), sample}));
-    });
+    const SampleId id{seed_, replicate, 0, sample};
+    if (options.mode == ImsOptions::Mode::exact)
+      exactPass(pixels, id, stop, frame);
+    else
+      fastPass(pixels, options, id, stop, frame);
     return {.completed = !stop.stop_requested(), .biased = options.biased()};
   }
 
@@ -47,12 +46,74 @@ class ImsMethod final : public Method {
   /// Keeps the walks' random numbers apart from the pixels'.
   static constexpr uint64_t kWalkSeed = 0x6c62272e07bb0142ull;
 
+  void exactPass(const ImsPixels& pixels, SampleId id, std::stop_token stop, PassFrame& frame) const {
+    forEachPixel(frame, stop, [&](int x, int y) { frame.set(x, y, pixels.sample(x, y, of(id, x, y))); });
+  }
+
+  /// Light of x1 alone in each pixel; what else there is, at the coarse pixels, and from them everywhere.
+  void fastPass(const ImsPixels& pixels, const ImsOptions& options, SampleId id, std::stop_token stop,
+                PassFrame& frame) {
+    if (!upsampling_)
+      upsampling_ =
+          std::make_unique<Upsampling>(pictureFeatures(*scene_), frame.width(), frame.height(), options.spacing);
+    const std::vector<Upsampling::Pixel>& computed = upsampling_->computed();
+    std::vector<Upsampling::Light> light(computed.size());
+    parallelFor(static_cast<int64_t>(computed.size()), 4, [&](int64_t i) {
+      if (stop.stop_requested()) return;
+      const auto n = static_cast<size_t>(i);
+      light[n] = indirectLight(pixels, computed[n], options.samples, id);
+    });
+    forEachPixel(frame, stop, [&](int x, int y) {
+      LayerRadiance radiance = pixels.sample(x, y, of(id, x, y), ImsPixels::Part::direct);
+      const Upsampling::Light found = upsampling_->at(light, x, y);
+      for (size_t l = 0; l < 2; ++l) {
+        radiance.value[static_cast<int>(kOnSurface[l])] = found.surface[l];
+        radiance.value[static_cast<int>(kInMedia[l])] = found.media[l];
+      }
+      frame.set(x, y, radiance);
+    });
+  }
+  Upsampling::Light indirectLight(const ImsPixels& pixels, Upsampling::Pixel p, int samples, SampleId id) const {
+    Upsampling::Light light;
+    const float share = 1 / static_cast<float>(samples);
+    for (int s = 0; s < samples; ++s) {
+      SampleId own = of(id, p.x, p.y);
+      own.index = own.index * static_cast<uint32_t>(samples) + static_cast<uint32_t>(s);
+      const LayerRadiance r = pixels.sample(p.x, p.y, own);
+      for (size_t l = 0; l < 2; ++l) {
+        light.surface[l] += r.value[static_cast<int>(kOnSurface[l])] * share;
+        light.media[l] += r.value[static_cast<int>(kInMedia[l])] * share;
+      }
+    }
+    return light;
+  }
+
+  SampleId of(SampleId id, int x, int y) const {
+    id.stream = scene_->camera.pixelStream(x, y);
+    return id;
+  }
+  template <class Body>
+  static void forEachPixel(const PassFrame& frame, std::stop_token stop, const Body& body) {
+    constexpr int kTile = 16;
+    const int tilesX = (frame.width() + kTile - 1) / kTile, tilesY = (frame.height() + kTile - 1) / kTile;
+    parallelFor(int64_t{tilesX} * tilesY, 1, [&](int64_t tile) {
+      const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
+      for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
+        for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x) body(x, y);
+    });
+  }
+
   void refuse() const {
     if (scene_->view.emissive)
       throw Error("method \"ims\" does not carry the light of media that glow", {{}, "render with --method path", {}});
   }
 
+  /// The layers of Upsampling::Light.
+  static constexpr Layer kOnSurface[2] = {Layer::surfaceToSurface, Layer::mediaToSurface};
+  static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
+
   SceneSnapshot scene_;
+  std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
   ImsSettings settings_;
   uint64_t seed_ = 0;
 };

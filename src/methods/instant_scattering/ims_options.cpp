@@ -9,6 +9,7 @@
 namespace virga {
 namespace {
 
+constexpr std::string_view kMode[] = {"exact", "fast"};
 constexpr std::string_view kCompensate[] = {"path", "sampled", "none"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
@@ -26,6 +27,7 @@ std::string wordOf(const std::string_view (&words)[N], auto value) {
 }  // namespace
 
 bool ImsOptions::biased() const {
+  if (mode == Mode::fast) return true;
   if (show != Show::picture || !gather.visibility || compensate == Compensate::none) return true;
   if (compensate != Compensate::sampled) return false;
   return compensation.localMeanTransmittance ||
@@ -35,6 +37,9 @@ bool ImsOptions::biased() const {
 ImsSettings::ImsSettings(const Settings& settings) {
   const SettingsReader reader(settings, kImsSettings, "ims");
   ImsOptions& o = given_;
+  o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
+  o.samples = reader.integer("samples", 1).value_or(o.samples);
+  o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   o.walks = reader.integer("walks", 1).value_or(o.walks);
   o.amount = {reader.integer("paths", 0).value_or(0), reader.integer("lights", 1).value_or(4)};
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
@@ -71,7 +76,10 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
 
 SettingValues valuesOf(const ImsOptions& o) {
   const CompensationOptions& c = o.compensation;
-  return {{"walks", std::to_string(o.walks)},
+  return {{"mode", wordOf(kMode, o.mode)},
+          {"samples", std::to_string(o.samples)},
+          {"spacing", std::to_string(o.spacing)},
+          {"walks", std::to_string(o.walks)},
           {"lights", std::to_string(o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
           {"radius", fmt::format("{}", c.radius)},

@@ -8,9 +8,13 @@ namespace virga {
 
 /// All that `ims` can be told, with the scene's own values where the settings are silent.
 struct ImsOptions {
+  enum class Mode { exact, fast };
   enum class Compensate { path, sampled, none };
   enum class Show { picture, lost, compensation };
 
+  Mode mode = Mode::exact;
+  int samples = 16;  ///< fast: of a coarse pixel in each pass
+  int spacing = 8;   ///< fast: of coarse pixels [pixels]
   int walks = 8192;
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray

@@ -5,10 +5,13 @@
 
 namespace virga {
 
-/// Samples of pixels, lit by one set of virtual lights (`exact`): eye paths that gather at each vertex that can be
-/// connected to. The scene and the lights must outlive it.
+/// Samples of pixels, lit by one set of virtual lights: eye paths that gather at each vertex that can be connected to.
+/// The scene and the lights must outlive it.
 class ImsPixels {
  public:
+  /// All layers, or without those that virtual lights light: x1 alone.
+  enum class Part { all, direct };
+
   ImsPixels(const Scene& scene, const VirtualLights& lights, const ImsOptions& options)
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
@@ -20,7 +23,7 @@ class ImsPixels {
   ImsPixels& operator=(const ImsPixels&) = delete;
 
   /// (x, y): a pixel of the crop window. Safe to call from many threads.
-  LayerRadiance sample(int x, int y, const SampleId& id) const {
+  LayerRadiance sample(int x, int y, const SampleId& id, Part part = Part::all) const {
     if (options_.path.maxDepth == 0) return {};
     Sampler sampler(id);
     const Vec2 offset = scene_.filter.sample(sampler.next2D());
@@ -29,8 +32,8 @@ class ImsPixels {
     Tracer::Record record;
     path.record = &record;
     // The path finds what clamping takes, or nothing of what virtual lights could light.
-    const bool compensates =
-        options_.compensate == ImsOptions::Compensate::path && options_.show == ImsOptions::Show::picture;
+    const bool compensates = part == Part::all && options_.compensate == ImsOptions::Compensate::path &&
+                             options_.show == ImsOptions::Show::picture;
     path.bound = compensates ? options_.gather.bound : kInfinity;
     for (bool goesOn = true; goesOn;) {
       record.vertex.kind = VertexKind::none;
@@ -38,7 +41,10 @@ class ImsPixels {
       const LayerRadiance before = path.radiance;
       goesOn = tracer_.extend(path, sampler);
       if (options_.show != ImsOptions::Show::picture) path.radiance = before;  // no light straight from lamps
-      if (record.vertex.kind != VertexKind::none) lightVertex(record, events, path, sampler);
+      if (part == Part::direct)
+        goesOn = goesOn && !path.layers.hasX2();
+      else if (record.vertex.kind != VertexKind::none)
+        lightVertex(record, events, path, sampler);
     }
     return path.radiance;
   }

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/instant_scattering/pixel_features.h"
+
+#include "core/parallel.h"
+#include "transport/vertex.h"
+
+namespace virga {
+namespace {
+
+/// Steps through each stretch of a heterogeneous medium.
+constexpr int kSteps = 64;
+
+/// Optical depth along a ray, gathered front to back.
+struct SeenMedia {
+  Rgb depth;
+  double weight = 0, moment = 0;
+
+  void add(float t0, float t1, Rgb here) {
+    const float before = mean(exp(depth * -1));
+    depth += here;
+    const float seen = before - mean(exp(depth * -1));
+    weight += static_cast<double>(seen);
+    moment += static_cast<double>(seen * 0.5f * (t0 + t1));
+  }
+};
+
+void march(const MediumView& medium, const Ray& ray, float t0, float t1, SeenMedia& seen) {
+  if (medium.homogeneous) {
+    const Rgb sigmaT = medium.spectrum * medium.sigmaT;
+    // Where a stretch has no end, what is seen of it lies within a few mean free paths.
+    const float end = std::min(t1, t0 + 16 / medium.sigmaT), step = (end - t0) / 16;
+    for (int i = 0; i < 16; ++i) {
+      const float a = t0 + step * static_cast<float>(i);
+      seen.add(a, a + step, sigmaT * step);
+    }
+    if (end < t1) seen.add(end, end, std::isinf(t1) ? Rgb(kInfinity) : sigmaT * (t1 - end));
+    return;
+  }
+  const Vec3 o = medium.worldToDensity.point(ray.o), d = medium.worldToDensity.vector(ray.d);
+  const ClippedRange in = clipToBox(o, d, medium.density.supportLo, medium.density.supportHi, t0, t1);
+  if (!(in.t0 < in.t1)) return;
+  const float step = (in.t1 - in.t0) / kSteps;
+  for (int i = 0; i < kSteps; ++i) {
+    const float a = in.t0 + step * static_cast<float>(i);
+    seen.add(a, a + step, medium.sigmaTAt(ray.at(a + 0.5f * step)) * step);
+  }
+}
+
+/// A colour by which the surface's light may be divided; of bsdfs other than diffuse ones nothing is known.
+Rgb reflectanceOf(const Side& side) {
+  if (side.bsdf->kind() != Bsdf::Kind::diffuse) return Rgb(1.f);
+  const Rgb r = side.bsdf->value(Vec3(0, 0, 1), Vec3(0, 0, 1)) * kPi;
+  return side.wo.z > 0 ? r : Rgb();
+}
+
+}  // namespace
+
+PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
+  const SceneView& view = scene.view;
+  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  const CameraRay camera = scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  MediaRay r = leaveCamera(view, camera.ray);
+  const RayHit hit = rays.nearest(r.ray, camera.tMax);
+  PixelFeatures f;
+  f.regular = true;
+  f.depth = hit.found() ? hit.t : kInfinity;
+  SeenMedia seen;
+  walkMedia(view, rays, r, hit.found() ? hit.t : camera.tMax, [&](float t0, float t1) {
+    for (int i = 0; i < r.media.count(); ++i) march(view.media[r.media.medium(i)], r.ray, t0, t1, seen);
+    return true;
+  });
+  const Rgb transmittance = exp(seen.depth * -1);
+  f.opacity = Rgb(1.f) - transmittance;
+  f.mediaDepth = seen.weight > 0 ? static_cast<float>(seen.moment / seen.weight) : 0;
+  if (!hit.found()) return f;
+  const SurfacePoint point = surfacePoint(view.surfaces[hit.shape], r.ray, hit, view.scale);
+  Bsdf textured;
+  const Side side = sideOf(view, point, hit, -r.ray.d, textured);
+  f.regular = !side.bsdf->specular() && !side.bsdf->isThin();
+  f.p = point.p;
+  f.normal = dot(point.shadingNormal, r.ray.d) > 0 ? -point.shadingNormal : point.shadingNormal;
+  f.surface = transmittance * reflectanceOf(side);
+  return f;
+}
+
+std::vector<PixelFeatures> pictureFeatures(const Scene& scene) {
+  const int width = scene.camera.width, height = scene.camera.height;
+  std::vector<PixelFeatures> features(static_cast<size_t>(width) * static_cast<size_t>(height));
+  parallelFor(height, 4, [&](int64_t y) {
+    for (int x = 0; x < width; ++x)
+      features[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)] =
+          pixelFeatures(scene, x, static_cast<int>(y));
+  });
+  return features;
+}
+
+}  // namespace virga

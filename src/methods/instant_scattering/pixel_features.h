@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "scene/scene.h"
+
+namespace virga {
+
+/// What a pixel shows, as far as it says how like another's its multiply scattered light is.
+struct PixelFeatures {
+  bool regular = false;  ///< false: a mirror or glass is seen, of which nothing can be said
+  float depth = 0;       ///< to the surface along the ray [unit]; infinite without one
+  Vec3 p, normal;        ///< of the surface, world; the normal toward the eye
+  Rgb surface;           ///< its reflectance times the transmittance to it: what light on it is seen through
+  Rgb opacity;           ///< 1 - transmittance to the surface, or to the end: likewise for light from the media
+  float mediaDepth = 0;  ///< mean distance of the media, by how much of them is seen there [unit]
+};
+
+/// Of the ray through the middle of pixel (x, y). Media are marched through; there is nothing random.
+PixelFeatures pixelFeatures(const Scene& scene, int x, int y);
+
+/// Of all pixels, row by row.
+std::vector<PixelFeatures> pictureFeatures(const Scene& scene);
+
+}  // namespace virga
