@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "methods/instant_scattering/ims_method.h"
 #include "methods/settings_reader.h"
 
@@ -17,7 +19,9 @@ constexpr std::string_view kVisibility[] = {"exact", "none"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
-constexpr float kRadiusShare = 0.2f;
+constexpr float kRadiusShare = 0.3f;
+/// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
+constexpr int kLights = 8, kLightsWhereTracked = 1;
 
 template <size_t N>
 std::string wordOf(const std::string_view (&words)[N], auto value) {
@@ -41,7 +45,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.samples = reader.integer("samples", 1).value_or(o.samples);
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   o.walks = reader.integer("walks", 1).value_or(o.walks);
-  o.amount = {reader.integer("paths", 0).value_or(0), reader.integer("lights", 1).value_or(4)};
+  o.amount.walks = reader.integer("paths", 0).value_or(0);
+  lights_ = reader.integer("lights", 1);
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
   o.gather.visibility = reader.choice("visibility", kVisibility).value_or(0) == 0;
@@ -51,8 +56,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
   c.ending = static_cast<CompensationOptions::Ending>(reader.choice("ending", kEnding).value_or(2));
   c.vertices[0] = reader.integer("v1", 1).value_or(1);
   c.vertices[1] = reader.integer("v2", 1).value_or(1);
-  c.amounts[0] = {reader.integer("p1", 0).value_or(0), o.amount.lights};
-  c.amounts[1] = {reader.integer("p2", 0).value_or(0), o.amount.lights};
+  c.amounts[0].walks = reader.integer("p1", 0).value_or(0);
+  c.amounts[1].walks = reader.integer("p2", 0).value_or(0);
   c.localMeanTransmittance = reader.choice("transmittance", kTransmittance).value_or(0) == 1;
   radius_ = reader.number("radius", 0);
   const std::optional<float> bound = reader.number("bound", 0);
@@ -68,6 +73,10 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   ImsOptions o = given_;
   o.path.maxDepth = o.gather.maxDepth = maxDepth_.value_or(scene.integrator.maxDepth);
   o.path.rrDepth = rrDepth_.value_or(scene.integrator.rrDepth);
+  const bool tracked = std::any_of(scene.view.media.begin(), scene.view.media.end(),
+                                   [](const MediumView& medium) { return !medium.homogeneous; });
+  for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
+    amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
   const float extent = std::max(maxComponent(scene.view.bounds.extent()), 1e-6f * scene.view.scale);
   o.compensation.radius = radius_.value_or(kRadiusShare * extent);
   o.gather.bound = 1 / square(o.compensation.radius);

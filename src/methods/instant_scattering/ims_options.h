@@ -39,7 +39,7 @@ class ImsSettings {
  private:
   ImsOptions given_;
   std::optional<float> radius_;
-  std::optional<int> maxDepth_, rrDepth_;
+  std::optional<int> lights_, maxDepth_, rrDepth_;
 };
 
 /// The values that are in force, by the names of kImsSettings.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "methods/instant_scattering/ims_options.h"
+#include "methods/instant_scattering/marched_light.h"
 
 namespace virga {
 
@@ -18,7 +19,16 @@ class ImsPixels {
         options_(options),
         tracer_(scene_.view, rays_, options_.path),
         gatherer_(scene_.view, rays_, lights, options_.gather),
-        compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation) {}
+        compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
+        marched_(scene_.view, rays_) {}
+  /// Is the light of lamps found by marching? It is where some medium is heterogeneous; elsewhere the tracer finds it
+  /// with less noise, and panes need it.
+  static bool marches(const SceneView& scene) {
+    for (const MediumView& medium : scene.media)
+      if (!medium.homogeneous) return !scene.thinGlass;
+    return false;
+  }
+
   ImsPixels(const ImsPixels&) = delete;
   ImsPixels& operator=(const ImsPixels&) = delete;
 
@@ -27,8 +37,11 @@ class ImsPixels {
     if (options_.path.maxDepth == 0) return {};
     Sampler sampler(id);
     const Vec2 offset = scene_.filter.sample(sampler.next2D());
-    Tracer::Path path = tracer_.start(
-        scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y));
+    const CameraRay camera =
+        scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+    if (LayerRadiance marched; part == Part::direct && marches_ && marched_.add(camera, marched, sampler))
+      return marched;
+    Tracer::Path path = tracer_.start(camera);
     Tracer::Record record;
     path.record = &record;
     // The path finds what clamping takes, or nothing of what virtual lights could light.
@@ -62,9 +75,11 @@ class ImsPixels {
   const Scene& scene_;
   EmbreeRays rays_;
   ImsOptions options_;
+  bool marches_ = marches(scene_.view);
   Tracer tracer_;                          ///< refers to the members above
   Gatherer<EmbreeRays> gatherer_;          ///< likewise
   Compensation<EmbreeRays> compensation_;  ///< likewise
+  MarchedLight<EmbreeRays> marched_;       ///< likewise
 };
 
 }  // namespace virga
