@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fast mode of instant multiple scattering: what is upsampled, what is computed itself, and how far the picture is
+// from the truth.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/upsampling.h"
+#include "methods/rendering.h"
+#include "volume/procedural.h"
+#include "volume/volume_io.h"
+
+namespace virga {
+namespace {
+
+using namespace virga::testing;
+
+std::string sensor(int size) {
+  return fmt::format(R"(<sensor type="perspective"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0, 0.3, 5" target="0, -0.1, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="{0}"/><integer name="height" value="{0}"/><rfilter type="box"/></film>
+    </sensor>)",
+                     size);
+}
+
+/// A volume on disk for as long as the tests run.
+struct SmokeFile {
+  std::filesystem::path path =
+      std::filesystem::temp_directory_path() / fmt::format("virga_ims_fast.{}.vol", ::getpid());
+  SmokeFile() { writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 48})); }
+  ~SmokeFile() { std::filesystem::remove(path); }
+};
+
+/// A plume over a floor, beside a block, under a point light.
+std::string plume(int size) {
+  static const SmokeFile file;
+  return sensor(size) + fmt::format(R"(
+    <emitter type="point"><point name="position" x="-2.5" y="3" z="1.5"/><rgb name="intensity" value="50"/></emitter>
+    <shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="-90"/><translate y="-1"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf></shape>
+    <shape type="cube"><transform name="to_world"><scale value="0.3"/><translate x="1.2" y="-0.7" z="0.6"/></transform></shape>
+    <shape type="cube"><transform name="to_world"><scale value="0.95"/></transform><bsdf type="null"/>
+      <medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
+        <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
+        <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium></shape>)",
+                                    file.path.string());
+}
+
+/// Fog in a room with a lamp on the ceiling and a ball of `bsdf`.
+std::string fog(int size, const std::string& bsdf = R"(<bsdf type="diffuse"/>)") {
+  const auto wall = [](const char* turn, const char* color) {
+    return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><scale value="2"/><translate z="-2"/>{}
+      </transform><bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf></bsdf></shape>)",
+                       turn, color);
+  };
+  return sensor(size) + wall("", "0.7, 0.7, 0.7") + wall(R"(<rotate x="1" angle="90"/>)", "0.7, 0.7, 0.7") +
+         wall(R"(<rotate x="1" angle="-90"/>)", "0.7, 0.7, 0.7") +
+         wall(R"(<rotate y="1" angle="90"/>)", "0.6, 0.1, 0.1") +
+         wall(R"(<rotate y="1" angle="-90"/>)", "0.1, 0.5, 0.1") +
+         fmt::format(
+             R"(<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
+      <translate y="1.98"/></transform><emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>
+      <shape type="sphere"><float name="radius" value="0.6"/><point name="center" x="0.6" y="-1" z="0.4"/>{}</shape>
+      <shape type="cube"><transform name="to_world"><scale value="1.9"/></transform><bsdf type="null"/>
+      <medium name="interior" type="homogeneous"><float name="sigma_t" value="0.4"/><float name="albedo" value="0.9"/>
+      </medium></shape>)",
+             bsdf);
+}
+
+RenderSession fast(const std::string& elements, int passes, int spacing = 4) {
+  return rendered(sceneOf(elements), {.passes = passes,
+                                      .layers = LayerMask::all(),
+                                      .method = "ims",
+                                      .settings = {{"mode", "fast"}, {"spacing", std::to_string(spacing)}}});
+}
+
+/// Mean of a layer over the picture, by `path`, and by the fast mode.
+struct Levels {
+  double path, fast, beauty;
+};
+
+void expectNear(const std::string& elements, double tolerance, int passes) {
+  const RenderSession truth =
+      rendered(sceneOf(elements), {.passes = 12 * passes, .seed = 5, .layers = LayerMask::all()});
+  const RenderSession own = fast(elements, passes);
+  const double beauty = replicateMoments(truth.film()).mean();
+  for (int l = 0; l < kLayerCount; ++l) {
+    const auto layer = static_cast<Layer>(l);
+    const stats::Moments a = replicateMoments(own.film(), layer), b = replicateMoments(truth.film(), layer);
+    const double noise = 4 * std::hypot(a.standardError(), b.standardError());
+    EXPECT_NEAR(a.mean(), b.mean(), tolerance * b.mean() + 1e-3 * beauty + noise)
+        << kLayerNames[static_cast<size_t>(l)];
+    EXPECT_LT(noise, 0.03 * beauty) << "too few samples to tell";
+  }
+}
+
+// The mean of each layer is held to 2 % of it. A filter that forgot opacity or transmittance is 10 % off and more.
+TEST(ImsFast, LayersOfAPlumeAreNearTheTruth) { expectNear(plume(48), 0.02, 24); }
+TEST(ImsFast, LayersOfFogAreNearTheTruth) { expectNear(fog(48), 0.02, 24); }
+TEST(ImsFast, MirrorsAndGlassAreComputedInEachPixel) { expectNear(fog(32, R"(<bsdf type="dielectric"/>)"), 0.02, 24); }
+
+TEST(ImsFast, IsSaidToBeBiased) {
+  RenderSession session(sceneOf(fog(8)), findMethod("ims"), {.settings = {.values = {{"mode", "fast"}}}});
+  EXPECT_TRUE(session.step().biased);
+}
+
+TEST(ImsFast, ThreadsChangeNothing) {
+  const auto picture = [](size_t threads) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return fast(plume(20), 2).film().beauty();
+  };
+  EXPECT_EQ(largestDifference(picture(1), picture(4)), 0);
+}
+
+// --- the filter ---
+
+/// A floor to the left, near, and to the right, far; fog of even opacity.
+std::vector<PixelFeatures> twoFloors(int width, int height) {
+  std::vector<PixelFeatures> features;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      PixelFeatures f;
+      const bool left = x < width / 2;
+      f.regular = true;
+      f.depth = left ? 2.f : 9.f;
+      f.p = {static_cast<float>(x) * 0.01f, static_cast<float>(y) * 0.01f, -f.depth};
+      f.normal = {0, 0, 1};
+      f.surface = Rgb(left ? 0.2f : 0.6f, 0.3f, 0);
+      f.opacity = Rgb(0.1f + 0.002f * static_cast<float>(x), 0.2f, 0.3f);
+      f.mediaDepth = 1;
+      features.push_back(f);
+    }
+  return features;
+}
+
+TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
+  const int width = 50, height = 37;
+  const auto features = twoFloors(width, height);
+  const Upsampling upsampling(features, width, height, 8);
+  const auto at = [&](int x, int y) -> const PixelFeatures& { return features[static_cast<size_t>(y * width + x)]; };
+  std::vector<Upsampling::Light> light;
+  for (const auto& p : upsampling.computed()) {
+    const PixelFeatures& f = at(p.x, p.y);
+    const float side = p.x < width / 2 ? 1.f : 5.f;
+    light.push_back({{f.surface * side, f.surface * (2 * side)}, {f.opacity * 3, f.opacity * 4}});
+  }
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const float side = x < width / 2 ? 1.f : 5.f;
+      const Upsampling::Light found = upsampling.at(light, x, y);
+      for (int c = 0; c < 3; ++c) {
+        ASSERT_NEAR(found.surface[0][c], at(x, y).surface[c] * side, 1e-4f) << x << " " << y << ": leaks over the edge";
+        ASSERT_NEAR(found.surface[1][c], at(x, y).surface[c] * side * 2, 2e-4f);
+        ASSERT_NEAR(found.media[0][c], at(x, y).opacity[c] * 3, 1e-4f);
+        ASSERT_NEAR(found.media[1][c], at(x, y).opacity[c] * 4, 1e-4f);
+      }
+    }
+}
+
+TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
+  const int width = 40, height = 24;
+  auto features = twoFloors(width, height);
+  const size_t coarse = Upsampling(features, width, height, 8).computed().size();
+  EXPECT_EQ(coarse, 5u * 3u);
+  features[static_cast<size_t>(9 * width + 11)].p.z = -5;  // something thin before the floor...
+  features[static_cast<size_t>(9 * width + 11)].depth = 5;
+  features[static_cast<size_t>(20 * width + 30)].regular = false;  // ...and a mirror
+  const Upsampling upsampling(features, width, height, 8);
+  ASSERT_EQ(upsampling.computed().size(), coarse + 2);
+  EXPECT_EQ(upsampling.computed()[coarse].x, 11);
+  EXPECT_EQ(upsampling.computed()[coarse + 1].x, 30);
+  std::vector<Upsampling::Light> light(coarse + 2);
+  light[coarse + 1].media[0] = Rgb(7.f);
+  EXPECT_EQ(upsampling.at(light, 30, 20).media[0].r, 7.f);
+}
+
+TEST(Upsampling, OnePixelIsAPicture) {
+  const Upsampling upsampling(twoFloors(1, 1), 1, 1, 8);
+  ASSERT_EQ(upsampling.computed().size(), 1u);
+  const std::vector<Upsampling::Light> light{{{Rgb(1.f), Rgb(2.f)}, {Rgb(3.f), Rgb(4.f)}}};
+  EXPECT_NEAR(upsampling.at(light, 0, 0).media[1].g, 4, 1e-5f);
+}
+
+TEST(PixelFeatures, OfFogBeforeAWall) {
+  const SceneSnapshot scene = sceneOf(pinpointSensor("0, 0, 5", "0, 0, 0", "0, 1, 0", 4) + R"(
+    <shape type="rectangle"><transform name="to_world"><translate z="-2"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.25, 0"/></bsdf></shape>
+    <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="0.35"/>
+      </medium></shape>)");
+  const PixelFeatures f = pixelFeatures(*scene, 1, 1);
+  const float transmittance = std::exp(-0.7f);
+  EXPECT_TRUE(f.regular);
+  EXPECT_NEAR(f.depth, 7, 0.02f);
+  EXPECT_NEAR(f.opacity.r, 1 - transmittance, 1e-4f);
+  EXPECT_NEAR(f.surface.r, 0.5f * transmittance, 1e-4f);
+  EXPECT_NEAR(f.surface.g, 0.25f * transmittance, 1e-4f);
+  EXPECT_EQ(f.surface.b, 0);
+  // mean of t exp(-s t) over the two units of fog, from the near face on
+  const float s = 0.35f, mean = 1 / s - 2 * transmittance / (1 - transmittance);
+  EXPECT_NEAR(f.mediaDepth, 4 + mean, 0.02f);
+}
+
+TEST(MarchMedia, HomogeneousMediaAreExactAndEmptyOnesAreNothing) {
+  const SceneSnapshot scene = sceneOf(pinpointSensor("0, 0, 5", "0, 0, 0", "0, 1, 0", 4) + R"(
+    <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><rgb name="sigma_t" value="0.3, 1, 2"/>
+      </medium></shape>)");
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  const MediaRay r{{{0.1f, 0.2f, 5}, {0, 0, -1}}, scene->view.cameraMedia, 0};
+  const Rgb through = marchedTransmittance(scene->view, rays, r, kInfinity, 7, 0.4f);
+  EXPECT_NEAR(through.r, std::exp(-0.6f), 1e-4f);
+  EXPECT_NEAR(through.b, std::exp(-4.f), 1e-4f);
+  EXPECT_EQ(marchedTransmittance(scene->view, rays, r, 3.5f, 7, 0.4f).r, 1);
+}
+
+// A coarse march of a grid is near the truth for every shift, and 256 steps are nearer.
+TEST(MarchMedia, GridsConverge) {
+  const SceneSnapshot scene = sceneOf(plume(8));
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  const MediaRay r{{{-0.05f, -0.3f, 4.5f}, {0, 0, -1}}, scene->view.cameraMedia, 0};
+  const auto by = [&](int steps, float shift) { return marchedTransmittance(scene->view, rays, r, 8, steps, shift).g; };
+  const float truth = by(20000, 0);
+  ASSERT_LT(truth, 0.9f) << "there is smoke on the way";
+  for (const float shift : {0.f, 0.3f, 0.7f, 0.99f}) {
+    EXPECT_NEAR(std::log(by(24, shift)), std::log(truth), 0.1f * std::fabs(std::log(truth))) << shift;
+    EXPECT_NEAR(std::log(by(512, shift)), std::log(truth), 2e-3f * std::fabs(std::log(truth))) << shift;
+  }
+}
+
+}  // namespace
+}  // namespace virga
