@@ -127,6 +127,8 @@ Action addRender(CLI::App& app) {
       "Threads; the picture does not depend on it", "N");
   addRepeated(app, "--set", o->settings, "Parameter of the method; repeatable", "method.param=value");
   app.add_flag("--layers", o->layers, "Add all transport layers and the variances to the EXR");
+  app.add_option("--dots", o->dots, "Write the picture with the method's virtual lights as dots over it")
+      ->type_name("FILE.png");
   app.add_option("--stats", o->stats, "Write timings and counts as JSON")->type_name("FILE");
   app.add_flag("-q,--quiet", o->quiet, "Print nothing but errors");
   app.footer(

@@ -31,6 +31,7 @@ struct RenderOptions {
   int threads = 0;                    ///< 0: as many as there are
   std::vector<std::string> settings;  ///< "method.param=value"
   std::string stats;
+  std::string dots;  ///< PNG with the method's overlay
   bool layers = false;
   bool quiet = false;
 };

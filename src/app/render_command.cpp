@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "app/audit_report.h"
+#include "app/dots.h"
 #include "app/interrupt.h"
 #include "app/method_settings.h"
 #include "app/options.h"
@@ -19,6 +20,7 @@
 #include "app/render_report.h"
 #include "app/scene_source.h"
 #include "app/stopwatch.h"
+#include "app/usage_error.h"
 #include "core/atomic_write.h"
 #include "scene/builder.h"
 
@@ -86,11 +88,13 @@ class RenderJob {
   }
 
   void run() {
-    checkNames(report_.outputs, options_.stats);
+    checkNames(allPictures(), options_.stats);
+    if (!options_.dots.empty() && outputFormat(options_.dots) != OutputFormat::png)
+      throw UsageError("--dots writes a PNG");
     requireInputsSafe({options_.scene.file});
     requireErrorEstimate(options_, method_);
     const Settings settings = methodSettings(method_, options_.settings, options_.seed);
-    checkAllWritable(report_.outputs, options_.stats);
+    checkAllWritable(allPictures(), options_.stats);
     const SceneSnapshot scene = loadAndBuild();
     const LayerMask layers = options_.layers ? method_.layers : LayerMask::none();
     requireMemory(*scene, layers);
@@ -116,7 +120,7 @@ class RenderJob {
   }
 
   void requireInputsSafe(const std::vector<std::filesystem::path>& inputs) const {
-    for (const std::string& output : report_.outputs) checkNotInput(output, inputs);
+    for (const std::string& output : allPictures()) checkNotInput(output, inputs);
     checkNotInput(options_.stats, inputs);
   }
 
@@ -174,11 +178,23 @@ class RenderJob {
     const auto shield = interrupt_.shield();
     const Stopwatch watch;
     writePictures(report_.outputs, developed(session, report_, options_.layers ? WithLayers::yes : WithLayers::no));
+    if (!options_.dots.empty()) writeDots(session);
     report_.timings.write = watch.seconds();
     report_.timings.total = total_.seconds();
     report_.timings.totalCpu = cpuSeconds();
     if (!options_.stats.empty()) writeAtomically(options_.stats, statsJson(session, report_));
-    for (const std::string& path : report_.outputs) say("wrote {}\n", path);
+    for (const std::string& path : allPictures()) say("wrote {}\n", path);
+  }
+
+  void writeDots(const RenderSession& session) {
+    const Overlay overlay = session.method().overlay();
+    if (overlay.dots.empty()) warn("--dots: method \"{}\" has nothing to draw", method_.name);
+    writePng(options_.dots, withDots(session.film().beauty(), session.scene(), overlay));
+  }
+  std::vector<std::string> allPictures() const {
+    std::vector<std::string> all = report_.outputs;
+    if (!options_.dots.empty()) all.push_back(options_.dots);
+    return all;
   }
 
   void warnOfNonFinite(const Film& film) {

@@ -64,6 +64,18 @@ struct PerspectiveCamera {
     const float inverseZ = 1 / local.z;
     return {{toWorld.translation + d * (nearClip * inverseZ), d}, (farClip - nearClip) * inverseZ};
   }
+  /// Where a point shows, in pixels of the crop window; false behind the camera.
+  VIRGA_HD bool project(Vec3 p, Vec2& at) const {
+    const Vec3 x = toWorld.vector({1, 0, 0}), y = toWorld.vector({0, 1, 0}), z = toWorld.vector({0, 0, 1});
+    const Vec3 v = p - toWorld.translation;
+    const float depth = dot(v, cross(x, y)) / dot(x, cross(y, z));
+    if (!(depth > 0)) return false;
+    const float scale = 1 / (depth * dot(x, cross(y, z)));
+    const float sx = dot(v, cross(y, z)) * scale / tanX, sy = dot(v, cross(z, x)) * scale / tanY;
+    at = {((1 - sx) * 0.5f - shiftX) * static_cast<float>(filmWidth) - static_cast<float>(cropX),
+          ((1 - sy) * 0.5f - shiftY) * static_cast<float>(filmHeight) - static_cast<float>(cropY)};
+    return true;
+  }
 };
 
 }  // namespace virga

@@ -26,6 +26,9 @@ class ImsMethod final : public Method {
 
   SettingValues settingsInForce() const override { return valuesOf(settings_.forScene(*scene_)); }
 
+  /// The virtual lights of the last pass: green on surfaces, red in media.
+  Overlay overlay() const override { return overlay_; }
+
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const ImsOptions options = settings_.forScene(*scene_);
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
@@ -33,6 +36,7 @@ class ImsMethod final : public Method {
     const VirtualLights lights = traceVirtualLights(
         *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
         {seed_ ^ kWalkSeed, replicate, 0, sample});
+    overlay_ = dotsOf(lights);
     const ImsPixels pixels(*scene_, lights, options);
     const SampleId id{seed_, replicate, 0, sample};
     if (options.mode == ImsOptions::Mode::exact)
@@ -103,6 +107,15 @@ class ImsMethod final : public Method {
     });
   }
 
+  static Overlay dotsOf(const VirtualLights& lights) {
+    constexpr size_t kMost = 4096;
+    Overlay overlay;
+    for (size_t i = 0; i < std::min(kMost, lights.lights.size()); ++i) {
+      const LightVertex& v = lights.lights[i];
+      overlay.dots.push_back({v.p, v.kind == VertexKind::surface ? Rgb(0, 1, 0) : Rgb(1, 0, 0)});
+    }
+    return overlay;
+  }
   void refuse() const {
     if (scene_->view.emissive)
       throw Error("method \"ims\" does not carry the light of media that glow", {{}, "render with --method path", {}});
@@ -114,6 +127,7 @@ class ImsMethod final : public Method {
 
   SceneSnapshot scene_;
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
+  Overlay overlay_;
   ImsSettings settings_;
   uint64_t seed_ = 0;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+
 #include "methods/instant_scattering/ims_options.h"
 #include "methods/instant_scattering/marched_light.h"
 
@@ -21,12 +23,14 @@ class ImsPixels {
         gatherer_(scene_.view, rays_, lights, options_.gather),
         compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
         marched_(scene_.view, rays_) {}
-  /// Is the light of lamps found by marching? It is where some medium is heterogeneous; elsewhere the tracer finds it
-  /// with less noise, and panes need it.
+  /// Is the light of lamps found by marching? Not where there are panes, which it does not see through, nor from lamps
+  /// in homogeneous media alone: there the tracer's equiangular sampling leaves less noise.
   static bool marches(const SceneView& scene) {
-    for (const MediumView& medium : scene.media)
-      if (!medium.homogeneous) return !scene.thinGlass;
-    return false;
+    if (scene.thinGlass) return false;
+    const auto isLocal = [](const EmitterView& e) { return e.isLocal(); };
+    const auto isHeterogeneous = [](const MediumView& medium) { return !medium.homogeneous; };
+    return std::none_of(scene.emitters.begin(), scene.emitters.end(), isLocal) ||
+           std::any_of(scene.media.begin(), scene.media.end(), isHeterogeneous);
   }
 
   ImsPixels(const ImsPixels&) = delete;
