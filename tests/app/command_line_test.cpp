@@ -295,6 +295,41 @@ TEST_F(CommandLine, AnAuditJudgesTheErrorThatWasAskedFor) {
   EXPECT_EQ(verdict({"--error", "1e-3", "--passes", "1"}), "not reached");
 }
 
+// The noise of clamped virtual lights falls below what was asked for; their bias does not.
+TEST_F(CommandLine, AnAuditJudgesABiasedMethod) {
+  const Names clamped = {"render",  "fog.xml",      "-m",      "ims",  "--set", "ims.compensation=none",
+                         "--set",   "ims.radius=2", "--error", "0.02", "-o",    "a.exr",
+                         "--stats", "stats.json"};
+  const Ended alone = run(clamped);
+  EXPECT_EQ(alone.exitCode, 0) << alone.err;
+  EXPECT_TRUE(contains(alone.err, "add --audit SEC")) << alone.err;
+  Names audited = clamped;
+  audited.insert(audited.end(), {"--audit", "1.5"});
+  const Ended r = run(audited);
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const nlohmann::json audit = json("stats.json")["audit"];
+  EXPECT_LT(audit["bias"]["high"], 0) << "clamping takes light";
+  EXPECT_EQ(audit["error"]["verdict"], "not reached") << r.err;
+}
+
+TEST_F(CommandLine, DotsShowWhereVirtualLightsStand) {
+  const Ended r = run({"render", "fog.xml", "-m", "ims", "--set", "ims.walks=1024", "--passes", "1", "-o", "a.png",
+                       "--dots", "dots.png"});
+  ASSERT_EQ(r.exitCode, 0) << r.err;
+  const Image plain = picture("a.png"), dots = picture("dots.png");
+  int green = 0, red = 0;
+  for (size_t i = 0; i < dots.pixels.size(); ++i) {
+    if (dots.pixels[i] == plain.pixels[i]) continue;
+    green += dots.pixels[i] == Rgb(0, 1, 0);
+    red += dots.pixels[i] == Rgb(1, 0, 0);
+  }
+  EXPECT_GT(green, 0) << "on the ground";
+  EXPECT_GT(red, 0) << "in the fog";
+  EXPECT_TRUE(contains(run({"render", "fog.xml", "-o", "b.png", "--dots", "none.png"}).err, "nothing to draw"));
+  EXPECT_EQ(run({"render", "fog.xml", "-o", "b.png", "--dots", "dots.exr"}).exitCode, 2);
+  EXPECT_EQ(run({"render", "fog.xml", "-o", "b.png", "--dots", "b.png"}).exitCode, 2);
+}
+
 TEST_F(CommandLine, AnInterruptEndsTheAuditAndKeepsThePicture) {
   Program program(scratch_, {"render", "fog.xml", "--audit", "1000", "-o", "a.exr"});
   ASSERT_TRUE(program.waitForStderr("auditing"));

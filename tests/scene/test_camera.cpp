@@ -76,6 +76,22 @@ TEST(Camera, CornersByHand) {
   EXPECT_NEAR(corner.ray.at(corner.tMax).z, 1e4f, 1e-2f) << "to the far plane";
 }
 
+TEST(Camera, ProjectsWhatItsRaysMeet) {
+  const SceneSnapshot scene = seenBy(sensor(
+      number("fov", 50) + number("principal_point_offset_x", 0.1) +
+          "<transform name=\"to_world\"><scale value=\"3\"/><lookat origin=\"1, 2, 3\" target=\"0, 0.5, -1\" up=\"0, "
+          "1, 0\"/></transform>",
+      whole("width", 120) + whole("height", 80) + whole("crop_offset_x", 30) + whole("crop_offset_y", 10)));
+  for (const Vec2 pixel : {Vec2{0.5f, 0.5f}, Vec2{33, 12}, Vec2{70, 69}}) {
+    const Ray ray = scene->camera.ray(pixel.x, pixel.y).ray;
+    Vec2 at;
+    ASSERT_TRUE(scene->camera.project(ray.at(7), at));
+    EXPECT_NEAR(at.x, pixel.x, 1e-3f);
+    EXPECT_NEAR(at.y, pixel.y, 1e-3f);
+    EXPECT_FALSE(scene->camera.project(ray.at(-7), at)) << "behind the eye";
+  }
+}
+
 TEST(Camera, PortraitFilms) {
   const auto tangents = [](const char* axis) {
     const SceneSnapshot scene =
