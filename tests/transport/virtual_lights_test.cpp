@@ -19,11 +19,14 @@ using test::build;
 /// Fog, walls of which some are glossy, a glass ball, lamps of several kinds.
 std::string mixedRoom() {
   const auto wall = [](const char* turn, const char* bsdf) {
-    return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><translate z="-1"/>{}</transform>{}</shape>)",
-                       turn, bsdf);
+    return fmt::format(
+        R"(<shape type="rectangle"><transform name="to_world"><translate z="-1"/>{}</transform>{}</shape>)", turn,
+        bsdf);
   };
-  return wall("", R"(<bsdf type="diffuse"/>)") + wall(R"(<rotate x="1" angle="-90"/>)", R"(<bsdf type="phong"><float name="exponent" value="8"/></bsdf>)") +
-         wall(R"(<rotate y="1" angle="90"/>)", R"(<bsdf type="roughconductor"><float name="alpha" value="0.5"/></bsdf>)") +
+  return wall("", R"(<bsdf type="diffuse"/>)") +
+         wall(R"(<rotate x="1" angle="-90"/>)", R"(<bsdf type="phong"><float name="exponent" value="8"/></bsdf>)") +
+         wall(R"(<rotate y="1" angle="90"/>)",
+              R"(<bsdf type="roughconductor"><float name="alpha" value="0.5"/></bsdf>)") +
          R"(<shape type="sphere"><float name="radius" value="0.3"/><bsdf type="dielectric"/></shape>
     <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><rgb name="sigma_t" value="0.5, 1, 2"/>
       <float name="albedo" value="0.9"/></medium></shape>
@@ -104,7 +107,8 @@ TEST(VirtualLights, OtherSeedsReplicatesAndPassesAreOtherWalks) {
   for (const SampleId& id : {SampleId{6, 1, 0, 3}, SampleId{5, 2, 0, 3}, SampleId{5, 1, 0, 4}}) {
     const VirtualLights other = traceVirtualLights(*scene, {.walks = 100}, id);
     int equal = 0;
-    for (int w = 0; w < 100; ++w) equal += sameWalk(all, other, w) && all.firstOf[static_cast<size_t>(w)] < all.firstOf[static_cast<size_t>(w) + 1];
+    for (int w = 0; w < 100; ++w)
+      equal += sameWalk(all, other, w) && all.firstOf[static_cast<size_t>(w)] < all.firstOf[static_cast<size_t>(w) + 1];
     EXPECT_EQ(equal, 0);
   }
 }
@@ -149,7 +153,8 @@ TEST(VirtualLights, AnEmptySceneKeepsNone) {
 
 /// A camera in fog without end.
 std::string endless(const std::string& elements) {
-  return elements + R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/><float name="albedo" value="0.8"/></medium>
+  return elements +
+         R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/><float name="albedo" value="0.8"/></medium>
     <sensor type="perspective" id="camera"><transform name="to_world"><lookat origin="0, 0, 9" target="0, 0, 0" up="0, 1, 0"/>
     </transform><ref name="medium" id="fog"/></sensor>)";
 }
@@ -190,7 +195,8 @@ TEST(WalkStarts, WhatReplacesHasNoFogInside) {
   EXPECT_FLOAT_EQ(extinctionAtStart(*endlessScene(kPoint + glass(""))), 0) << "vacuum";
 }
 TEST(WalkStarts, OfLightsInACloudThatTheCameraDeclaresAgain) {
-  const std::string cloud = R"(<shape type="sphere"><float name="radius" value="20"/><bsdf type="null"/><ref name="interior" id="fog"/>
+  const std::string cloud =
+      R"(<shape type="sphere"><float name="radius" value="20"/><bsdf type="null"/><ref name="interior" id="fog"/>
     </shape>)";
   EXPECT_FLOAT_EQ(extinctionAtStart(*endlessScene(kPoint + cloud)), 0.5f);
 }
@@ -206,12 +212,14 @@ TEST(WalkStarts, LightFromInfinityDoesNotGetThroughFogWithoutEnd) {
 
 // A lamp that lies on the boundary of fog shines into it: what it emits inward meets all of the fog.
 TEST(WalkStarts, LampsOnABoundary) {
-  const std::string fog = R"(<shape type="cube"><transform name="to_world"><scale value="10"/></transform><bsdf type="null"/>
+  const std::string fog =
+      R"(<shape type="cube"><transform name="to_world"><scale value="10"/></transform><bsdf type="null"/>
     <medium name="interior" type="homogeneous"><float name="sigma_t" value="1"/><float name="albedo" value="0.5"/></medium></shape>)";
   const auto lamp = [](const char* turn) {
-    return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="{}"/><translate z="10"/></transform>
+    return fmt::format(
+        R"(<shape type="rectangle"><transform name="to_world"><rotate x="1" angle="{}"/><translate z="10"/></transform>
       <emitter type="area"/></shape>)",
-                       turn);
+        turn);
   };
   const auto first = [&](const char* turn) {
     const VirtualLights all = traceVirtualLights(*build(fog + lamp(turn)), {.walks = 4000, .maxDepth = 1}, kId);
