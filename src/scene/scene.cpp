@@ -107,7 +107,7 @@ Surroundings enclosingSurface(const SceneView& view, const RayScene& surfaces, c
 
 }  // namespace
 
-MediaState mediaAt(const Scene& scene, Vec3 p) {
+MediaState mediaAt(const Scene& scene, Vec3 p, int endless) {
   // Along any line, the first crossing of a closed boundary is an exit if and only if the line starts inside. Of those
   // that replace, the nearest is the innermost. Open ones are taken for one: the nearest of them decides.
   const Ray ray{p, normalize(Vec3(0.5377f, 0.7123f, 0.4511f))};
@@ -134,6 +134,7 @@ MediaState mediaAt(const Scene& scene, Vec3 p) {
   // As if they had been entered from outside: what lies farther than the one that replaces, that one, what lies within
   // it.
   MediaState state;
+  state.setBase(endless);
   const auto enter = [&](const Crossing& c) {
     state.enter(static_cast<int>(c.shape), scene.view.boundaries[c.shape].interior);
   };

@@ -71,8 +71,9 @@ struct ChangeSet {
 ChangeSet differences(const SceneDescription& before, const SceneDescription& after);
 
 /// The media around a point, away from all surfaces and boundaries, by the closed shapes that it lies in: the interiors
-/// of null boundaries, or of the innermost shape that replaces.
-MediaState mediaAt(const Scene&, Vec3 p);
+/// of null boundaries, or of the innermost shape that replaces. `endless`: the medium that is around everything, if
+/// there is one.
+MediaState mediaAt(const Scene&, Vec3 p, int endless = MediaState::kNone);
 
 /// 64 bits of everything that the description says and of the contents of the files that it names (not of where they
 /// lie), for metadata. Reads those files.

@@ -35,7 +35,8 @@ VIRGA_HD inline EmittedRay sampleEmittedRay(const SceneView& scene, const Emitte
     case EmitterView::Kind::area: {
       const LightPoint on = uniformPointOnShape(scene.surfaces[emitter.shape], emitter, uPosition);
       const Vec3 w = Frame(on.normal).toWorld(cosineHemisphere(uDirection));
-      const float aside = kHitError * std::max(maxComponent(abs(on.p)), 1e-2f * scene.scale);
+      // The point is less exact than one that a ray has met: its error is that of the corners of its shape.
+      const float aside = kHitError * std::max(maxComponent(abs(on.p)), 5e-2f * scene.scale);
       return {{on.p + on.normal * aside, w}, emitter.radianceAt(on.uv) * (kPi / on.areaPdf)};
     }
     case EmitterView::Kind::directional:

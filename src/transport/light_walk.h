@@ -16,7 +16,7 @@ struct alignas(64) LightVertex {
   int medium = -1;   ///< the one that scatters; -1 on surfaces
   int depth = 0;     ///< scattering events, this one included; specular ones count, thin glass that is passed does not
   int surface = -1;  ///< where its SurfaceScattering is kept; -1: it is Lambertian, with reflectance / pi in the weight
-  Vec3 normal;       ///< geometric, on the side that the light came to; 0 in media
+  Vec3 normal;       ///< geometric, on the side of the bsdf's frame; 0 in media
 };
 
 /// Random walks that carry flux from the lights (methods.md 2.1; Dachsbacher et al.'s virtual point lights in media,
@@ -96,7 +96,8 @@ class LightWalker {
     Bsdf textured;
     const Side side = sideOf(scene_, point, hit, wi, textured);
     const bool specular = side.bsdf->specular();
-    if (side.leaks(wi, side.wo)) return false;
+    const bool fromBehind = side.wo.z <= 0 && !side.bsdf->transmits();  // black, as one-sided bsdfs are there
+    if (fromBehind || side.leaks(wi, side.wo)) return false;
     const float arrival = std::fabs(dot(wi, point.geometricNormal));
     if (side.bsdf->broad()) {
       const SurfaceScattering scattering(side);

@@ -57,12 +57,6 @@ void append(VirtualLights& all, const VirtualLights& block) {
 
 WalkStarts::WalkStarts(const Scene& scene) : scene_(scene), endless_(endlessMedium(scene)) {}
 
-MediaState WalkStarts::mediaAround(Vec3 p) const {
-  MediaState media = mediaAt(scene_, p);
-  if (media.vacuum()) media.setBase(endless_);
-  return media;
-}
-
 WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const SceneView& view = scene_.view;
   if (view.emitters.size == 0 || !(view.emitterChoice.cdf[view.emitters.size] > 0)) return {};
@@ -71,7 +65,7 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();
   const EmittedRay emitted = sampleEmittedRay(view, emitter, uPosition, uDirection);
   if (isBlack(emitted.flux)) return {};
-  const Start start{{emitted.ray, mediaAround(emitted.ray.o), 0}, emitted.flux / choice.probability};
+  const Start start{{emitted.ray, mediaAt(scene_, emitted.ray.o, endless_), 0}, emitted.flux / choice.probability};
   // Light from infinity does not get through fog that has no end.
   if (emitter.infinite() && !start.at.media.vacuum()) return {};
   return start;

@@ -39,8 +39,6 @@ class WalkStarts {
   Start sample(Sampler& sampler) const;
 
  private:
-  MediaState mediaAround(Vec3 p) const;
-
   const Scene& scene_;
   int endless_;  ///< index of the medium that is around everything, or MediaState::kNone
 };

@@ -349,6 +349,10 @@ TEST(Collisions, OfOverlappingVolumesAddUp) {
   EXPECT_NEAR(count[1] / double{kCount}, 0.8, 4 * 0.4 / std::sqrt(kCount));
 }
 
+Rgb transmittance(const SceneView& scene, const EmbreeRays& rays, MediaRay ray, float tMax, Pcg32& random) {
+  return passMedia(scene, rays, ray, tMax, random);
+}
+
 TEST(Collisions, TransmittanceIsTheProductOverAllIntervals) {
   const SceneSnapshot scene =
       test::build(boxVolume({Vec3(-1), Vec3(1)}, 1) + boxVolume({Vec3(0, -1, -1), Vec3(3, 1, 1)}, 2));

@@ -44,9 +44,10 @@ class Compensation {
       Record next;
       if (!findVertex(at, next, sampler)) continue;
       next.throughput *= 1 / static_cast<float>(count);
-      // As many go on as the light they bring is worth.
-      const float q =
-          std::min(1.f, maxComponent(next.throughput) * static_cast<float>(count) / maxComponent(at.throughput));
+      // As many go on as the light they bring is worth; from the third level on that is less than one in all, or
+      // recursion in dense media would never end.
+      const float kept = level <= 2 ? static_cast<float>(count) : 1;
+      const float q = std::min(1.f, maxComponent(next.throughput) * kept / maxComponent(at.throughput));
       if (!(sampler.random() < q)) continue;
       next.throughput *= 1 / q;
       light(next, layers, events + 1, radiance, sampler, level);
