@@ -128,6 +128,27 @@ void lookupsOneByOne(benchmark::State& state) {
 }
 BENCHMARK(lookupsOneByOne);
 
+/// The majorant cells that shadow rays pass through from end to end.
+void cellsOfShadows(benchmark::State& state) {
+  const Bench& b = Bench::get();
+  const MediumView& medium = b.smoke.medium;
+  float depth = 0;
+  int64_t cells = 0;
+  const auto visit = [&](float t0, float t1, float majorant, bool) {
+    depth += (t1 - t0) * majorant;
+    ++cells;
+    return true;
+  };
+  for (auto _ : state)
+    for (const PathWork::Flight& f : b.work.shadows) {
+      const GridRay ray(medium, f.ray);
+      forEachMajorant(medium.density, ray.o, ray.d, 0, f.tMax, visit);
+    }
+  benchmark::DoNotOptimize(depth);
+  state.SetItemsProcessed(cells);
+}
+BENCHMARK(cellsOfShadows);
+
 void flightsOfPaths(benchmark::State& state) {
   const Bench& b = Bench::get();
   Pcg32 random(2);
