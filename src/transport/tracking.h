@@ -28,37 +28,53 @@ VIRGA_HD inline ClippedRange clipToBox(Vec3 o, Vec3 d, Vec3 lo, Vec3 hi, float t
   return {t0, t1};
 }
 
+/// One axis of a walk through the cells of a grid. It never leaves the grid, whatever rounding does at its border.
+struct CellAxis {
+  float next;   ///< where the ray crosses the next border, or infinity
+  float delta;  ///< from border to border
+  int left;     ///< borders that are still ahead
+  int stride;   ///< of the cell's index, forward along the ray
+
+  /// `start`: at t0, `origin`: at t = 0, both in cells; `speed` in cells per t. Adds the first cell's part of the
+  /// index.
+  VIRGA_HD CellAxis(int count, int cellStride, float start, float origin, float speed, int& index) {
+    const float inverse = 1 / speed;
+    const bool forward = speed > 0;
+    const int cell = static_cast<int>(clamp(std::floor(start), 0.f, static_cast<float>(count - 1)));
+    index += cell * cellStride;
+    stride = forward ? cellStride : -cellStride;
+    left = std::isinf(inverse) ? 0 : (forward ? count - 1 - cell : cell);
+    delta = std::fabs(inverse);
+    next = left > 0 ? (static_cast<float>(forward ? cell + 1 : cell) - origin) * inverse : kInfinity;
+  }
+  /// Goes to the next cell if its border is not beyond t. Free of branches: which axis comes next is hard to predict.
+  VIRGA_HD void advance(float t, int& index) {
+    const bool crosses = next <= t;
+    index += crosses ? stride : 0;
+    left -= crosses ? 1 : 0;
+    const float beyond = left > 0 ? next + delta : kInfinity;
+    next = crosses ? beyond : next;
+  }
+};
+
 /// Walks the cells of a majorant grid along o + t d (index coordinates of the fine grid; d of any length) for t in [t0,
 /// t1], which lies in the grid's box: visit(a, b, majorant) for each piece, in order, until it returns false. Returns
 /// false if it did.
 template <class Visit>
 VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
-  const int count[3] = {grid.nx, grid.ny, grid.nz};
-  int cell[3], step[3];
-  float next[3], delta[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverseSize = 1 / grid.cellSize[axis];
-    const float start = (o[axis] + d[axis] * t0 - grid.origin[axis]) * inverseSize;
-    const float top = static_cast<float>(count[axis] - 1);
-    cell[axis] = static_cast<int>(clamp(std::floor(start), 0.f, top));
-    const float speed = d[axis] * inverseSize;
-    step[axis] = speed < 0 ? -1 : 1;
-    delta[axis] = speed == 0 ? kInfinity : std::fabs(1 / speed);
-    const float edge = static_cast<float>(cell[axis] + (speed < 0 ? 0 : 1));
-    next[axis] = speed == 0 ? kInfinity : (edge - (o[axis] - grid.origin[axis]) * inverseSize) / speed;
-  }
+  const Vec3 scale = Vec3(1) / grid.cellSize, origin = (o - grid.origin) * scale, speed = d * scale;
+  const Vec3 start = (o + d * t0 - grid.origin) * scale;
+  int index = 0;
+  CellAxis x(grid.nx, 1, start.x, origin.x, speed.x, index);
+  CellAxis y(grid.ny, grid.nx, start.y, origin.y, speed.y, index);
+  CellAxis z(grid.nz, grid.nx * grid.ny, start.z, origin.z, speed.z, index);
   for (float t = t0; t < t1;) {
-    const int axis = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
-    const float end = std::min(next[axis], t1);
-    if (end > t && !visit(t, end, grid.cell(cell[0], cell[1], cell[2]))) return false;
+    const float border = std::min(x.next, std::min(y.next, z.next)), end = std::min(border, t1);
+    if (end > t && !visit(t, end, grid.values[index])) return false;
     t = std::max(t, end);
-    next[axis] += delta[axis];
-    cell[axis] += step[axis];
-    if (cell[axis] < 0 || cell[axis] >= count[axis]) {
-      // Rounding may step out just before the end: the rest is the last cell's neighbour in name only.
-      cell[axis] = cell[axis] < 0 ? 0 : count[axis] - 1;
-      next[axis] = kInfinity;
-    }
+    x.advance(border, index);
+    y.advance(border, index);
+    z.advance(border, index);
   }
   return true;
 }
