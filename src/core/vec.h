@@ -87,8 +87,8 @@ struct Bounds {
   void extend(Vec3 p) { lo = min(lo, p), hi = max(hi, p); }
   void extend(const Bounds& b) { lo = min(lo, b.lo), hi = max(hi, b.hi); }
   bool empty() const { return !(lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z); }
-  Vec3 center() const { return (lo + hi) * 0.5f; }
-  Vec3 extent() const { return hi - lo; }
+  VIRGA_HD Vec3 center() const { return (lo + hi) * 0.5f; }
+  VIRGA_HD Vec3 extent() const { return hi - lo; }
   Vec3 corner(int i) const { return {(i & 1) ? hi.x : lo.x, (i & 2) ? hi.y : lo.y, (i & 4) ? hi.z : lo.z}; }
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };

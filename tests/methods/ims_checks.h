@@ -15,7 +15,7 @@ using ImsSettingsMap = std::map<std::string, std::string, std::less<>>;
 
 /// How much is computed: `sets` sessions of kReplicates replicates each, with `passes` passes a replicate.
 struct Trials {
-  int sets = 16;
+  int sets = 20;
   int passes = 1;
   uint64_t seed = 1;
 };
