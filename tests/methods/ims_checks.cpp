@@ -74,7 +74,7 @@ Estimates Estimates::scaled(Layer layer, double factor) const {
   return result;
 }
 
-Estimates estimates(const SceneSnapshot& scene, const std::string& method, const ImsSettingsMap& settings,
+Estimates estimates(const SceneSnapshot& scene, const std::string& method, const SettingValues& settings,
                     const Trials& trials) {
   Estimates result;
   for (int s = 0; s < trials.sets; ++s) {
@@ -130,7 +130,7 @@ void expectPower(const Estimates& a, const Estimates& truth, const std::vector<P
 }
 
 void expectImsIsPath(const std::string& elements, const std::vector<Power>& powers, const Trials& trials,
-                     const Grid2& grid) {
+                     const SettingsGrid& grid) {
   const SceneSnapshot scene = sceneOf(elements, ::testing::TempDir());
   const Estimates truth =
       estimates(scene, "path", {}, {.sets = 3 * trials.sets, .passes = trials.passes, .seed = trials.seed});
@@ -138,7 +138,7 @@ void expectImsIsPath(const std::string& elements, const std::vector<Power>& powe
   uint64_t seed = trials.seed;
   for (const std::string& compensation : grid.compensations)
     for (const double radius : grid.radii) {
-      ImsSettingsMap settings = grid.others;
+      SettingValues settings = grid.others;
       settings["compensation"] = compensation;
       settings["radius"] = fmt::format("{}", radius);
       const Estimates found =

@@ -11,8 +11,6 @@
 /// whole pictures are independent of each other.
 namespace virga::testing {
 
-using ImsSettingsMap = std::map<std::string, std::string, std::less<>>;
-
 /// How much is computed: `sets` sessions of kReplicates replicates each, with `passes` passes a replicate.
 struct Trials {
   int sets = 20;
@@ -49,7 +47,7 @@ class Estimates {
   stats::Moments moments_[kLayerCount][kRegions][kChannels];
 };
 
-Estimates estimates(const SceneSnapshot& scene, const std::string& method, const ImsSettingsMap& settings,
+Estimates estimates(const SceneSnapshot& scene, const std::string& method, const SettingValues& settings,
                     const Trials& trials);
 
 /// What Welch's test says about two estimates of one layer.
@@ -71,15 +69,15 @@ void expectSame(const Estimates& a, const Estimates& truth, const std::string& n
 void expectPower(const Estimates& a, const Estimates& truth, const std::vector<Power>& powers, const std::string& name);
 
 /// The grid of settings over which `ims` is held against `path`.
-struct Grid2 {
+struct SettingsGrid {
   std::vector<double> radii = {0.1, 0.25, 0.5, 1};
   std::vector<std::string> compensations = {"path", "sampled"};
-  ImsSettingsMap others = {{"walks", "1024"}};
+  SettingValues others = {{"walks", "1024"}};
 };
 
 /// All settings of the grid against `path`, each by itself, and all together, which tells finer. `powers` is what all
 /// together have to reach.
 void expectImsIsPath(const std::string& elements, const std::vector<Power>& powers, const Trials& trials = {},
-                     const Grid2& grid = {});
+                     const SettingsGrid& grid = {});
 
 }  // namespace virga::testing

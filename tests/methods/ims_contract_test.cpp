@@ -34,19 +34,19 @@ constexpr const char* kScene = R"(<scene version="3.0.0">
 
 SceneDescription description() { return parseMitsubaXml(kScene, "contract.xml", "."); }
 
-const std::vector<ImsSettingsMap> kVariants = {
+const std::vector<SettingValues> kVariants = {
     {{"walks", "200"}},
     {{"walks", "200"}, {"compensation", "sampled"}, {"paths", "2"}, {"v1", "2"}},
     {{"walks", "200"}, {"compensation", "none"}, {"show", "lost"}}};
 
-RenderSession sessionOf(const SceneSnapshot& scene, const ImsSettingsMap& settings,
+RenderSession sessionOf(const SceneSnapshot& scene, const SettingValues& settings,
                         LayerMask layers = LayerMask::none()) {
   return RenderSession(scene, findMethod("ims"), {.settings = {.values = settings, .seed = 7}, .layers = layers});
 }
 
 TEST(ImsContract, ThePictureDoesNotDependOnTheNumberOfThreads) {
   const SceneSnapshot scene = buildScene(description());
-  for (const ImsSettingsMap& settings : kVariants) {
+  for (const SettingValues& settings : kVariants) {
     const auto renderWith = [&](size_t threads) {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
       RenderSession session = sessionOf(scene, settings);
@@ -59,7 +59,7 @@ TEST(ImsContract, ThePictureDoesNotDependOnTheNumberOfThreads) {
 
 TEST(ImsContract, PassesArePureFunctionsOfTheirIndex) {
   const SceneSnapshot scene = buildScene(description());
-  for (const ImsSettingsMap& settings : kVariants) {
+  for (const SettingValues& settings : kVariants) {
     const auto make = [&] {
       auto method = findMethod("ims").create();
       method->prepare(scene, {.values = settings, .seed = 3}, LayerMask::none());
@@ -83,7 +83,7 @@ TEST(ImsContract, PassesArePureFunctionsOfTheirIndex) {
 
 TEST(ImsContract, LayersSumToTheBeautyAndAskingForThemChangesNothing) {
   const SceneSnapshot scene = buildScene(description());
-  for (const ImsSettingsMap& settings : kVariants) {
+  for (const SettingValues& settings : kVariants) {
     RenderSession plain = sessionOf(scene, settings), layered = sessionOf(scene, settings, LayerMask::all());
     for (int i = 0; i < 9; ++i) plain.step(), layered.step();
     Image sum(kWidth, kHeight);
@@ -171,22 +171,22 @@ TEST(ImsContract, AStopIsHonouredQuickly) {
 
 TEST(ImsSettings, InForceAreThoseThatWereGivenAndTheOthersDefaults) {
   const SceneSnapshot scene = buildScene(description());
-  const ImsSettingsMap given = {{"walks", "77"},
-                                {"lights", "3"},
-                                {"paths", "5"},
-                                {"radius", "0.25"},
-                                {"compensation", "sampled"},
-                                {"levels", "4"},
-                                {"ending", "reduced"},
-                                {"v1", "2"},
-                                {"v2", "3"},
-                                {"p1", "6"},
-                                {"p2", "7"},
-                                {"transmittance", "mean"},
-                                {"visibility", "none"},
-                                {"show", "compensation"},
-                                {"max_depth", "9"},
-                                {"rr_depth", "2"}};
+  const SettingValues given = {{"walks", "77"},
+                               {"lights", "3"},
+                               {"paths", "5"},
+                               {"radius", "0.25"},
+                               {"compensation", "sampled"},
+                               {"levels", "4"},
+                               {"ending", "reduced"},
+                               {"v1", "2"},
+                               {"v2", "3"},
+                               {"p1", "6"},
+                               {"p2", "7"},
+                               {"transmittance", "mean"},
+                               {"visibility", "none"},
+                               {"show", "compensation"},
+                               {"max_depth", "9"},
+                               {"rr_depth", "2"}};
   const SettingValues found = sessionOf(scene, given).method().settingsInForce();
   for (const auto& [name, value] : given) EXPECT_EQ(found.at(name), value) << name;
   EXPECT_EQ(found.at("bound"), "16");
@@ -205,7 +205,7 @@ TEST(ImsSettings, InForceAreThoseThatWereGivenAndTheOthersDefaults) {
   EXPECT_NEAR(std::stod(defaults.at("bound")), 1.0 / 9, 1e-6);
 }
 
-std::string messageOf(const SceneSnapshot& scene, const ImsSettingsMap& settings) {
+std::string messageOf(const SceneSnapshot& scene, const SettingValues& settings) {
   try {
     sessionOf(scene, settings);
   } catch (const Error& error) {
@@ -216,7 +216,7 @@ std::string messageOf(const SceneSnapshot& scene, const ImsSettingsMap& settings
 
 TEST(ImsSettings, WhatMakesNoSenseIsRefused) {
   const SceneSnapshot scene = buildScene(description());
-  const auto refused = [&](const ImsSettingsMap& settings, const char* message) {
+  const auto refused = [&](const SettingValues& settings, const char* message) {
     EXPECT_TRUE(messageOf(scene, settings).starts_with(message)) << messageOf(scene, settings);
   };
   refused({{"walks", "0"}}, "error: --set ims.walks: \"0\" is not an integer of at least 1");
@@ -257,8 +257,8 @@ const std::string kSky = R"(<emitter type="constant"><rgb name="radiance" value=
 const std::string kPoint =
     R"(<emitter type="point"><point name="position" x="0.3" y="0.2" z="0.1"/><rgb name="intensity" value="3"/></emitter>)";
 
-Film filmOf(const std::string& elements, const ImsSettingsMap& settings = {}, int passes = 8) {
-  ImsSettingsMap all = settings;
+Film filmOf(const std::string& elements, const SettingValues& settings = {}, int passes = 8) {
+  SettingValues all = settings;
   all.insert({"walks", "200"});
   RenderSession session = rendered(sceneOf(elements), {.passes = passes, .method = "ims", .settings = all});
   EXPECT_EQ(session.film().nonFiniteSamples(), 0u) << elements;
@@ -275,14 +275,14 @@ TEST(ImsRobustness, WithoutLightThePictureIsBlack) {
                               kCamera + R"(<shape type="sphere"/>)",
                               kFoggyCamera + R"(<emitter type="constant"/>)"};
   for (const std::string& elements : dark)
-    for (const ImsSettingsMap& settings :
-         {ImsSettingsMap{}, {{"compensation", "sampled"}}, {{"compensation", "none"}, {"show", "lost"}}})
+    for (const SettingValues& settings :
+         {SettingValues{}, {{"compensation", "sampled"}}, {{"compensation", "none"}, {"show", "lost"}}})
       EXPECT_EQ(brightness(filmOf(elements, settings)), 0) << elements;
 }
 
 TEST(ImsRobustness, WhatOnlyAbsorbsShowsTheLampsAlone) {
   const std::string black = ballOf(R"(<float name="sigma_t" value="2"/><float name="albedo" value="0"/>)");
-  for (const ImsSettingsMap& settings : {ImsSettingsMap{}, {{"compensation", "sampled"}}, {{"paths", "4"}}})
+  for (const SettingValues& settings : {SettingValues{}, {{"compensation", "sampled"}}, {{"paths", "4"}}})
     EXPECT_EQ(brightness(filmOf(kCamera + black + kPoint, settings)), 0);
 }
 
@@ -313,10 +313,10 @@ TEST(ImsRobustness, GlowingMediaAreRefused) {
 
 // --- lights where they are hard: means agree with path by a ratio, for tails are heavy ---
 
-void expectRatio(const std::string& elements, double tolerance, const ImsSettingsMap& settings = {}) {
+void expectRatio(const std::string& elements, double tolerance, const SettingValues& settings = {}) {
   const double truth =
       brightness(rendered(sceneOf(elements), {.passes = 256, .settings = {{"max_depth", "5"}}}).film());
-  ImsSettingsMap all = settings;
+  SettingValues all = settings;
   all.insert({{"walks", "1000"}, {"radius", "0.7"}, {"max_depth", "5"}});
   const double found = brightness(filmOf(elements, all, 160));
   EXPECT_GT(truth, 0) << elements;
@@ -324,7 +324,7 @@ void expectRatio(const std::string& elements, double tolerance, const ImsSetting
 }
 
 TEST(ImsRobustness, PointLightsInsideOfMedia) {
-  for (const ImsSettingsMap& settings : {ImsSettingsMap{}, {{"compensation", "sampled"}}})
+  for (const SettingValues& settings : {SettingValues{}, {{"compensation", "sampled"}}})
     for (const std::string& scene : {kCamera + kCloud, kFoggyCamera, kFoggyCamera + kCloud})
       expectRatio(scene + kPoint, 0.2, settings);
 }

@@ -12,7 +12,7 @@ namespace {
 
 using namespace virga::testing;
 
-const ImsSettingsMap kByPath = {{"compensation", "path"}}, kSampled = {{"compensation", "sampled"}};
+const SettingValues kByPath = {{"compensation", "path"}}, kSampled = {{"compensation", "sampled"}};
 
 // --- slabs ---
 
@@ -43,7 +43,7 @@ std::string slabScene(const Slab& slab, bool reflected) {
 }
 
 /// Beauty, one mean a replicate.
-stats::Moments beautyOf(const SceneSnapshot& scene, ImsSettingsMap settings, const Trials& trials) {
+stats::Moments beautyOf(const SceneSnapshot& scene, SettingValues settings, const Trials& trials) {
   stats::Moments m;
   for (int s = 0; s < trials.sets; ++s) {
     const RenderSession session = rendered(scene, {.passes = Film::kReplicates * trials.passes,
@@ -59,7 +59,7 @@ stats::Moments beautyOf(const SceneSnapshot& scene, ImsSettingsMap settings, con
 // The radius is half a mean free path.
 TEST(ImsExact, SlabsAgreeWithAddingDoubling) {
   for (const Slab& slab : kSlabs)
-    for (ImsSettingsMap settings : {kByPath, kSampled})
+    for (SettingValues settings : {kByPath, kSampled})
       for (const bool reflected : {true, false}) {
         settings.insert({{"walks", "2048"}, {"radius", "0.5"}, {"lights", "24"}});
         const stats::Moments m = beautyOf(sceneOf(slabScene(slab, reflected)), settings, {.sets = 24});
@@ -102,7 +102,7 @@ const std::string kWhiteBoard =
     R"(<shape type="disk"><transform name="to_world"><scale value="2"/><rotate x="1" angle="-90"/>
   <translate y="-1"/></transform><bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="1"/></bsdf></bsdf></shape>)";
 
-stats::Moments furnace(const std::string& elements, ImsSettingsMap settings) {
+stats::Moments furnace(const std::string& elements, SettingValues settings) {
   settings.insert({{"walks", "1024"}, {"radius", "0.4"}, {"lights", "8"}});
   return beautyOf(sceneOf(kFurnace + elements), settings, {.sets = 16});
 }
@@ -111,7 +111,7 @@ TEST(ImsFurnace, IsWhite) {
   const std::string scenes[] = {cloud("1", "0"), cloud("1", "0.6"), kBall + kWhiteBoard,
                                 cloud("1", "0") + kBall + kGlass + kWhiteBoard};
   for (const std::string& elements : scenes)
-    for (const ImsSettingsMap& settings : {kByPath, kSampled}) {
+    for (const SettingValues& settings : {kByPath, kSampled}) {
       const stats::Moments m = furnace(elements, settings);
       fmt::print("{:.4f} +- {:.4f}\n", m.mean(), m.standardError());
       EXPECT_NEAR(m.mean(), 1, 4 * m.standardError() + 1e-5) << elements;

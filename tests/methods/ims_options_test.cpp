@@ -45,7 +45,7 @@ class ImsOptionsTest : public ::testing::Test {
     scene_.reset();
     truth_ = {};
   }
-  static Estimates of(ImsSettingsMap settings, const Trials& trials = {.sets = 20}) {
+  static Estimates of(SettingValues settings, const Trials& trials = {.sets = 20}) {
     settings.insert({{"walks", "1024"}, {"radius", "0.6"}});
     return estimates(scene_, "ims", settings, trials);
   }
@@ -101,7 +101,7 @@ TEST_F(ImsOptionsTest, WhatIsLostIsWhatCompensationFinds) {
 
 struct Option {
   const char* name;
-  ImsSettingsMap settings;
+  SettingValues settings;
 };
 
 TEST_F(ImsOptionsTest, UnbiasedOnes) {
@@ -119,7 +119,7 @@ TEST_F(ImsOptionsTest, UnbiasedOnes) {
   Estimates all;
   uint64_t seed = 10;
   for (const Option& option : options) {
-    ImsSettingsMap settings = option.settings;
+    SettingValues settings = option.settings;
     if (!settings.contains("bound")) settings.insert({"radius", "0.6"});
     settings.insert({"walks", "1024"});
     const Estimates found = estimates(scene_, "ims", settings, {.sets = 14, .seed = ++seed});
@@ -138,11 +138,11 @@ TEST_F(ImsOptionsTest, UnbiasedOnes) {
 // Darker by what the last level's clamping takes: nothing more than no level at all would lose, less with each level,
 // and less where the bound is only raised.
 TEST_F(ImsOptionsTest, EndingsThatLoseLight) {
-  const auto lit = [&](const ImsSettingsMap& settings, uint64_t seed) {
+  const auto lit = [&](const SettingValues& settings, uint64_t seed) {
     return indirect(of(settings, {.sets = 24, .seed = seed}));
   };
   const auto level = [](const char* levels, const char* ending) {
-    return ImsSettingsMap{{"compensation", "sampled"}, {"levels", levels}, {"ending", ending}};
+    return SettingValues{{"compensation", "sampled"}, {"levels", levels}, {"ending", ending}};
   };
   const stats::Moments none = lit({{"compensation", "none"}}, 31), one = lit(level("1", "nothing"), 32),
                        two = lit(level("2", "nothing"), 33), reduced = lit(level("1", "reduced"), 34),
@@ -162,26 +162,26 @@ TEST_F(ImsOptionsTest, EndingsThatLoseLight) {
   EXPECT_LT(reduced.mean(), all.mean() + error);
 }
 
-bool flaggedBiased(const SceneSnapshot& scene, const ImsSettingsMap& settings) {
+bool flaggedBiased(const SceneSnapshot& scene, const SettingValues& settings) {
   RenderSession session(scene, findMethod("ims"), {.settings = {.values = settings, .seed = 1}, .layers = {}});
   return session.step().biased;
 }
 
 TEST_F(ImsOptionsTest, BiasIsDeclared) {
-  const ImsSettingsMap biased[] = {{{"compensation", "none"}},
-                                   {{"visibility", "none"}},
-                                   {{"show", "lost"}},
-                                   {{"show", "compensation"}, {"compensation", "sampled"}},
-                                   {{"transmittance", "mean"}, {"compensation", "sampled"}},
-                                   {{"levels", "1"}, {"ending", "nothing"}, {"compensation", "sampled"}},
-                                   {{"levels", "1"}, {"ending", "reduced"}, {"compensation", "sampled"}}};
-  const ImsSettingsMap unbiased[] = {{},
-                                     {{"compensation", "sampled"}},
-                                     {{"levels", "1"}, {"compensation", "sampled"}},
-                                     {{"transmittance", "mean"}},
-                                     {{"levels", "1"}, {"ending", "nothing"}}};
-  for (const ImsSettingsMap& settings : biased) EXPECT_TRUE(flaggedBiased(scene_, settings)) << settings.begin()->first;
-  for (const ImsSettingsMap& settings : unbiased) EXPECT_FALSE(flaggedBiased(scene_, settings));
+  const SettingValues biased[] = {{{"compensation", "none"}},
+                                  {{"visibility", "none"}},
+                                  {{"show", "lost"}},
+                                  {{"show", "compensation"}, {"compensation", "sampled"}},
+                                  {{"transmittance", "mean"}, {"compensation", "sampled"}},
+                                  {{"levels", "1"}, {"ending", "nothing"}, {"compensation", "sampled"}},
+                                  {{"levels", "1"}, {"ending", "reduced"}, {"compensation", "sampled"}}};
+  const SettingValues unbiased[] = {{},
+                                    {{"compensation", "sampled"}},
+                                    {{"levels", "1"}, {"compensation", "sampled"}},
+                                    {{"transmittance", "mean"}},
+                                    {{"levels", "1"}, {"ending", "nothing"}}};
+  for (const SettingValues& settings : biased) EXPECT_TRUE(flaggedBiased(scene_, settings)) << settings.begin()->first;
+  for (const SettingValues& settings : unbiased) EXPECT_FALSE(flaggedBiased(scene_, settings));
 }
 
 TEST(ImsBias, TheLocalMeanIsNotTheTransmittance) {
