@@ -39,9 +39,9 @@ class Gatherer {
     const int count = amount.walks > 0 ? std::min(amount.walks, all) : amount.lights;
     // One of each of as many equal parts of the list: neighbours in it are of one walk.
     const float share = static_cast<float>(all) / static_cast<float>(count) / static_cast<float>(lights_.walks());
-    const float start = sampler.random();
+    const double start = static_cast<double>(sampler.random());
     const auto pick = [&](int j) {
-      const float place = (static_cast<float>(j) + start) / static_cast<float>(count) * static_cast<float>(all);
+      const double place = (j + start) / count * all;
       return static_cast<size_t>(std::min(static_cast<int>(place), all - 1));
     };
     if (amount.walks == 0)

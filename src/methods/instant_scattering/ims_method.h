@@ -14,7 +14,7 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"lights", "8; 1 where a medium is heterogeneous",
      "single virtual lights that light a vertex, where no number of walks is given"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},
-    {"radius", "0.3 times the scene's extent",
+    {"radius", "0.3 times the scene's extent, or, without shapes, the mean free path",
      "virtual lights that are nearer are clamped, and what that takes is compensated [unit]"},
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
     {"compensation", "path",

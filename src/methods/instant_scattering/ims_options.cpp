@@ -28,6 +28,16 @@ std::string wordOf(const std::string_view (&words)[N], auto value) {
   return std::string(words[static_cast<size_t>(value)]);
 }
 
+/// Of the shapes; where there are none, the longest mean free path of the media, or one unit.
+float extentOf(const SceneView& scene) {
+  const float extent = maxComponent(scene.bounds.extent());
+  if (extent > 0) return extent;
+  float longest = 0;
+  for (const MediumView& medium : scene.media)
+    if (medium.sigmaT > 0) longest = std::max(longest, 1 / medium.sigmaT);
+  return longest > 0 ? longest : 1;
+}
+
 }  // namespace
 
 bool ImsOptions::biased() const {
@@ -77,8 +87,7 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
                                    [](const MediumView& medium) { return !medium.homogeneous; });
   for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
     amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
-  const float extent = std::max(maxComponent(scene.view.bounds.extent()), 1e-6f * scene.view.scale);
-  o.compensation.radius = radius_.value_or(kRadiusShare * extent);
+  o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
   o.gather.bound = 1 / square(o.compensation.radius);
   return o;
 }
