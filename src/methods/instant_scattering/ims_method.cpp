@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/ims_method.h"
 
-#include "core/parallel.h"
 #include "methods/instant_scattering/ims_pixels.h"
 #include "methods/instant_scattering/upsampling.h"
+#include "methods/pixels.h"
 
 namespace virga {
 namespace {
@@ -96,17 +96,6 @@ class ImsMethod final : public Method {
     id.stream = scene_->camera.pixelStream(x, y);
     return id;
   }
-  template <class Body>
-  static void forEachPixel(const PassFrame& frame, std::stop_token stop, const Body& body) {
-    constexpr int kTile = 16;
-    const int tilesX = (frame.width() + kTile - 1) / kTile, tilesY = (frame.height() + kTile - 1) / kTile;
-    parallelFor(int64_t{tilesX} * tilesY, 1, [&](int64_t tile) {
-      const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
-      for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
-        for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x) body(x, y);
-    });
-  }
-
   static Overlay dotsOf(const VirtualLights& lights) {
     constexpr size_t kMost = 4096;
     Overlay overlay;

@@ -5,6 +5,7 @@
 
 #include "methods/instant_scattering/ims_options.h"
 #include "methods/instant_scattering/marched_light.h"
+#include "methods/pixels.h"
 
 namespace virga {
 
@@ -40,9 +41,7 @@ class ImsPixels {
   LayerRadiance sample(int x, int y, const SampleId& id, Part part = Part::all) const {
     if (options_.path.maxDepth == 0) return {};
     Sampler sampler(id);
-    const Vec2 offset = scene_.filter.sample(sampler.next2D());
-    const CameraRay camera =
-        scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+    const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
     if (LayerRadiance marched; part == Part::direct && marches_ && marched_.add(camera, marched, sampler))
       return marched;
     Tracer::Path path = tracer_.start(camera);

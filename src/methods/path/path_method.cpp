@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/path/path_method.h"
 
-#include "core/parallel.h"
 #include "methods/path/path_pixels.h"
+#include "methods/pixels.h"
 #include "methods/settings_reader.h"
 
 namespace virga {
@@ -35,13 +35,8 @@ class PathMethod final : public Method {
     const PathPixels pixels(*scene_, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
-    constexpr int kTile = 16;
-    const int tilesX = (frame.width() + kTile - 1) / kTile, tilesY = (frame.height() + kTile - 1) / kTile;
-    parallelFor(int64_t{tilesX} * tilesY, 1, [&](int64_t tile) {
-      const int x0 = static_cast<int>(tile % tilesX) * kTile, y0 = static_cast<int>(tile / tilesX) * kTile;
-      for (int y = y0; y < std::min(y0 + kTile, frame.height()); ++y)
-        for (int x = x0; x < std::min(x0 + kTile, frame.width()) && !stop.stop_requested(); ++x)
-          frame.set(x, y, pixels.sample(x, y, {seed_, replicate, scene_->camera.pixelStream(x, y), sample}));
+    forEachPixel(frame, stop, [&](int x, int y) {
+      frame.set(x, y, pixels.sample(x, y, {seed_, replicate, scene_->camera.pixelStream(x, y), sample}));
     });
     return {.completed = !stop.stop_requested()};
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "methods/path/path_tracer.h"
+#include "methods/pixels.h"
 #include "scene/scene.h"
 
 namespace virga {
@@ -22,10 +23,7 @@ class PathPixels {
   LayerRadiance sample(int x, int y, const SampleId& id) const {
     if (options_.maxDepth == 0) return {};  // a path of no segment does not even reach a lamp
     Sampler sampler(id);
-    const Vec2 offset = scene_.filter.sample(sampler.next2D());
-    const CameraRay ray =
-        scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
-    return tracer_.trace(ray, sampler);
+    return tracer_.trace(sampleCameraRay(scene_, x, y, sampler), sampler);
   }
 
  private:
