@@ -71,11 +71,13 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   return start;
 }
 
-VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id) {
+VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
+                                 const std::stop_token& stop) {
   const int blocks = (options.walks + kBlock - 1) / kBlock;
   const WalkStarts starts(scene);
   std::vector<VirtualLights> parts(static_cast<size_t>(blocks));
   parallelFor(blocks, 1, [&](int64_t b) {
+    if (stop.stop_requested()) return;
     const int first = static_cast<int>(b) * kBlock;
     parts[static_cast<size_t>(b)] =
         traceBlock(scene, starts, options, id, first, std::min(first + kBlock, options.walks));

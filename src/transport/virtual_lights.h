@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "scene/scene.h"
@@ -24,8 +25,10 @@ struct WalkOptions {
 
 /// Walks number 0, 1, ... of a scene, the same for every number of threads. `id` names the set: its stream is not used,
 /// each walk has one of its own, so that the same walk in two sets of one replicate takes part in one low-discrepancy
-/// sequence. The flux of a vertex is that of its walk: divide by the number of walks.
-VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id);
+/// sequence. The flux of a vertex is that of its walk: divide by the number of walks. A
+/// stop leaves walks out.
+VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
+                                 const std::stop_token& stop = {});
 
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
 class WalkStarts {

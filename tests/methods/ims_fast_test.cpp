@@ -108,6 +108,22 @@ TEST(ImsFast, IsSaidToBeBiased) {
   EXPECT_TRUE(session.step().biased);
 }
 
+TEST(ImsFast, APathOfOneSegmentShowsLampsAlone) {
+  const RenderSession session = rendered(
+      sceneOf(plume(16)),
+      {.passes = 1, .layers = LayerMask::all(), .method = "ims", .settings = {{"mode", "fast"}, {"max_depth", "1"}}});
+  EXPECT_EQ(pixelMoments(session.film().beauty()).mean(), 0);
+}
+
+TEST(ImsFast, AStopBeforeTheFirstPassLeavesNothing) {
+  std::stop_source stop;
+  stop.request_stop();
+  RenderSession session(sceneOf(fog(8)), findMethod("ims"), {.settings = {.values = {{"mode", "fast"}}}});
+  EXPECT_FALSE(session.step({}, stop.get_token()).completed);
+  EXPECT_EQ(session.film().passes(), 0);
+  EXPECT_TRUE(session.step().completed);
+}
+
 TEST(ImsFast, ThreadsChangeNothing) {
   const auto picture = [](size_t threads) {
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);

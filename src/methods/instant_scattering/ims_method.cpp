@@ -35,7 +35,7 @@ class ImsMethod final : public Method {
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const VirtualLights lights = traceVirtualLights(
         *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
-        {seed_ ^ kWalkSeed, replicate, 0, sample});
+        {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
     const ImsPixels pixels(*scene_, lights, options);
     const SampleId id{seed_, replicate, 0, sample};
@@ -57,9 +57,11 @@ class ImsMethod final : public Method {
   /// Light of x1 alone in each pixel; what else there is, at the coarse pixels, and from them everywhere.
   void fastPass(const ImsPixels& pixels, const ImsOptions& options, SampleId id, std::stop_token stop,
                 PassFrame& frame) {
-    if (!upsampling_)
-      upsampling_ =
-          std::make_unique<Upsampling>(pictureFeatures(*scene_), frame.width(), frame.height(), options.spacing);
+    if (!upsampling_) {
+      std::vector<PixelFeatures> features = pictureFeatures(*scene_, stop);
+      if (stop.stop_requested()) return;
+      upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
+    }
     const std::vector<Upsampling::Pixel>& computed = upsampling_->computed();
     std::vector<Upsampling::Light> light(computed.size());
     parallelFor(static_cast<int64_t>(computed.size()), 4, [&](int64_t i) {

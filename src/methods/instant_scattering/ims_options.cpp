@@ -75,6 +75,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
   if (bound) radius_ = 1 / std::sqrt(*bound);
   if (o.show == ImsOptions::Show::compensation && o.compensate != ImsOptions::Compensate::sampled)
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
+  if (o.show != ImsOptions::Show::picture && o.mode == ImsOptions::Mode::fast)
+    throw Error("--set ims.show needs ims.mode=exact: fast does not tell parts of the picture apart");
   maxDepth_ = reader.integer("max_depth", -1);
   rrDepth_ = reader.integer("rr_depth", 1);
 }

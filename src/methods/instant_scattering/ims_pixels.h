@@ -78,11 +78,11 @@ class ImsPixels {
   const Scene& scene_;
   EmbreeRays rays_;
   ImsOptions options_;
-  bool marches_ = marches(scene_.view);
   Tracer tracer_;                          ///< refers to the members above
   Gatherer<EmbreeRays> gatherer_;          ///< likewise
   Compensation<EmbreeRays> compensation_;  ///< likewise
   MarchedLight<EmbreeRays> marched_;       ///< likewise
+  bool marches_ = marches(scene_.view) && tracer_.mayScatter(0);
 };
 
 }  // namespace virga

@@ -83,10 +83,11 @@ PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
   return f;
 }
 
-std::vector<PixelFeatures> pictureFeatures(const Scene& scene) {
+std::vector<PixelFeatures> pictureFeatures(const Scene& scene, const std::stop_token& stop) {
   const int width = scene.camera.width, height = scene.camera.height;
   std::vector<PixelFeatures> features(static_cast<size_t>(width) * static_cast<size_t>(height));
   parallelFor(height, 4, [&](int64_t y) {
+    if (stop.stop_requested()) return;
     for (int x = 0; x < width; ++x)
       features[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)] =
           pixelFeatures(scene, x, static_cast<int>(y));

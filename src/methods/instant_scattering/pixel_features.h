@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "scene/scene.h"
@@ -20,7 +21,7 @@ struct PixelFeatures {
 /// Of the ray through the middle of pixel (x, y). Media are marched through; there is nothing random.
 PixelFeatures pixelFeatures(const Scene& scene, int x, int y);
 
-/// Of all pixels, row by row.
-std::vector<PixelFeatures> pictureFeatures(const Scene& scene);
+/// Of all pixels, row by row. A stop leaves rows out.
+std::vector<PixelFeatures> pictureFeatures(const Scene& scene, const std::stop_token& stop = {});
 
 }  // namespace virga
