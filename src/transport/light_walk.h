@@ -105,7 +105,7 @@ class LightWalker {
       v.kind = VertexKind::surface, v.p = point.p, v.wi = wi, v.weight = state.flux / arrival;
       v.depth = state.depth + 1, v.normal = side.normal;
       const bool lambertian = side.bsdf->kind() == Bsdf::Kind::diffuse && point.shadingNormal == point.geometricNormal;
-      if (lambertian) v.weight *= scattering.scattering(side.normal, wi).value;
+      if (lambertian) v.weight *= scattering.scattering(side.normal, wi);
       if (!isBlack(v.weight)) visit(v, lambertian ? nullptr : &scattering);
     }
     const BsdfSample s = side.bsdf->sample(side.wo, pair(state, sampler), one(state, sampler));

@@ -64,12 +64,6 @@ VIRGA_HD inline float geometryTerm(Vec3 x, Vec3 normalX, Vec3 y, Vec3 normalY) {
 /// The part of a geometry term that min(g, bound) takes away: max(0, g - bound) / g.
 VIRGA_HD inline float clampedShareOf(float g, float bound) { return g > bound ? 1 - bound / g : 0; }
 
-/// What light from `wi` adds toward `to`, and the density [1/sr] with which a path that comes from `to` goes on to wi.
-struct Scattering {
-  Rgb value;      ///< albedo times phase function, or bsdf times |cosine of wi| [1/sr]
-  float pdf = 0;  ///< 0 where the value is black
-};
-
 /// A surface at one point, reached on one of its sides, kept for directions that come later.
 struct SurfaceScattering {
   Bsdf bsdf;
@@ -79,11 +73,11 @@ struct SurfaceScattering {
   SurfaceScattering() = default;
   VIRGA_HD explicit SurfaceScattering(const Side& side) : bsdf(*side.bsdf), frame(side.frame), normal(side.normal) {}
 
-  VIRGA_HD Scattering scattering(Vec3 to, Vec3 wi) const {
+  /// What light from wi adds toward `to`: bsdf times |cosine of wi| [1/sr].
+  VIRGA_HD Rgb scattering(Vec3 to, Vec3 wi) const {
     const Vec3 localTo = frame.toLocal(to), local = frame.toLocal(wi);
     if (dot(to, normal) * localTo.z <= 0 || dot(wi, normal) * local.z <= 0) return {};  // it would leak: Side::leaks()
-    const Rgb value = bsdf.value(localTo, local) * std::fabs(local.z);
-    return {value, isBlack(value) ? 0 : bsdf.pdf(localTo, local)};
+    return bsdf.value(localTo, local) * std::fabs(local.z);
   }
 };
 
@@ -112,16 +106,15 @@ struct Vertex {
     return v;
   }
 
-  /// Of light from wi, toward where the path came from.
-  VIRGA_HD Scattering scattering(Vec3 wi) const {
-    if (kind == VertexKind::surface) return surface.scattering(wo, wi);
-    return {albedo * phase.value(wo, wi), isBlack(albedo) ? 0 : phase.pdf(wo, wi)};
+  /// What light from wi adds toward where the path came from [1/sr].
+  VIRGA_HD Rgb scattering(Vec3 wi) const {
+    return kind == VertexKind::surface ? surface.scattering(wo, wi) : albedo * phase.value(wo, wi);
   }
   /// Geometric; 0 in a medium.
   VIRGA_HD Vec3 normal() const { return kind == VertexKind::surface ? point.geometricNormal : Vec3(0); }
   struct Direction {
     Vec3 wi;
-    Rgb weight;     ///< scattering(wi).value over its pdf
+    Rgb weight;     ///< scattering(wi) over its pdf
     float pdf = 0;  ///< [1/sr]; 0: the path ends here
     float eta = 1;  ///< as in BsdfSample
   };

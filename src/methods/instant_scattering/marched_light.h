@@ -166,7 +166,7 @@ class MarchedLight {
     const Vec3 wo = -r.ray.d;
     const LightSample light = sampleLamp(point.p, sampler);
     if (!(light.pdf > 0)) return;
-    const Rgb value = SurfaceScattering(seen.side).scattering(wo, light.wi).value * light.radiance;
+    const Rgb value = SurfaceScattering(seen.side).scattering(wo, light.wi) * light.radiance;
     if (isBlack(value)) return;
     const MediaRay leaving = leaveSurface(scene_, point, wo, light.wi, r.media);
     radiance.add(Layer::directSurface, through * value * (lampSeen(leaving, point.p, light, sampler) / light.pdf));
