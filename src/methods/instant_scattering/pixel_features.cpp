@@ -2,12 +2,12 @@
 #include "methods/instant_scattering/pixel_features.h"
 
 #include "core/parallel.h"
-#include "transport/vertex.h"
+#include "methods/instant_scattering/marched_light.h"
 
 namespace virga {
 namespace {
 
-/// Steps through each stretch of a heterogeneous medium.
+/// Steps through each stretch of media.
 constexpr int kSteps = 64;
 
 /// Optical depth along a ray, gathered front to back.
@@ -23,28 +23,6 @@ struct SeenMedia {
     moment += static_cast<double>(seen * 0.5f * (t0 + t1));
   }
 };
-
-void march(const MediumView& medium, const Ray& ray, float t0, float t1, SeenMedia& seen) {
-  if (medium.homogeneous) {
-    const Rgb sigmaT = medium.spectrum * medium.sigmaT;
-    // Where a stretch has no end, what is seen of it lies within a few mean free paths.
-    const float end = std::min(t1, t0 + 16 / medium.sigmaT), step = (end - t0) / 16;
-    for (int i = 0; i < 16; ++i) {
-      const float a = t0 + step * static_cast<float>(i);
-      seen.add(a, a + step, sigmaT * step);
-    }
-    if (end < t1) seen.add(end, end, std::isinf(t1) ? Rgb(kInfinity) : sigmaT * (t1 - end));
-    return;
-  }
-  const Vec3 o = medium.worldToDensity.point(ray.o), d = medium.worldToDensity.vector(ray.d);
-  const ClippedRange in = clipToBox(o, d, medium.density.supportLo, medium.density.supportHi, t0, t1);
-  if (!(in.t0 < in.t1)) return;
-  const float step = (in.t1 - in.t0) / kSteps;
-  for (int i = 0; i < kSteps; ++i) {
-    const float a = in.t0 + step * static_cast<float>(i);
-    seen.add(a, a + step, medium.sigmaTAt(ray.at(a + 0.5f * step)) * step);
-  }
-}
 
 /// A colour by which the surface's light may be divided; of bsdfs other than diffuse ones nothing is known.
 Rgb reflectanceOf(const Side& side) {
@@ -66,8 +44,10 @@ PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
   f.depth = hit.found() ? hit.t : kInfinity;
   SeenMedia seen;
   walkMedia(view, rays, r, hit.found() ? hit.t : camera.tMax, [&](float t0, float t1) {
-    for (int i = 0; i < r.media.count(); ++i) march(view.media[r.media.medium(i)], r.ray, t0, t1, seen);
-    return true;
+    return marchMedia(view, r.media, r.ray, t0, t1, kSteps, 0, [&](float a, float b, Rgb depth) {
+      seen.add(a, b, depth);
+      return true;
+    });
   });
   const Rgb transmittance = exp(seen.depth * -1);
   f.opacity = Rgb(1.f) - transmittance;
