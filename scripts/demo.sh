@@ -20,6 +20,7 @@ The picture:  out/demo.png  (to look at)
 Try next:
   build/release/virga render out/demo.xml --error 1e-3 --layers -o out/better.exr
   build/release/virga compare out/demo.exr out/better.exr
+  build/release/virga render out/demo.xml -m ims --set ims.mode=fast --passes 1 -o out/fast.png
   build/release/virga info out/better.exr
   build/release/virga make cloud -o out/cloud.vdb && build/release/virga render out/cloud.vdb -o out/cloud.png
   build/release/virga render --help
