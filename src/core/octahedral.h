@@ -8,7 +8,7 @@ namespace virga {
 /// Directions on a square (Engelhardt and Dachsbacher 2008): the octahedron |x| + |y| + |z| = 1 seen along z, its lower
 /// half folded outward.
 
-/// Along either axis of the square a place moves by no more than so many times what its direction turns [1/rad].
+/// The most that octahedralSpeed() returns.
 inline constexpr float kOctahedralSpeed = 1.41421356f;
 
 /// Of a direction of any length but 0, to [-1, 1]^2.
@@ -17,6 +17,14 @@ VIRGA_HD inline Vec2 toOctahedron(Vec3 w) {
   const float x = w.x * scale, y = w.y * scale;
   const float foldedX = std::copysign(1 - std::fabs(y), x), foldedY = std::copysign(1 - std::fabs(x), y);
   return w.z < 0 ? Vec2{foldedX, foldedY} : Vec2{x, y};
+}
+
+/// By how much a place moves at most, along either axis, for what its direction w (unit) turns [1/rad]: the length of
+/// the gradient of x / (|x| + |y| + |z|), which is that of y where the lower half is folded.
+VIRGA_HD inline float octahedralSpeed(Vec3 w) {
+  const float scale = 1 / (std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z));
+  const auto speed = [&](float c) { return std::sqrt(square(1 - c) + 2 * square(c)) * scale; };
+  return std::max(speed(std::fabs(w.x) * scale), speed(std::fabs(w.y) * scale));
 }
 
 /// From [-1, 1]^2, to a unit direction.

@@ -51,19 +51,34 @@ TEST(Octahedron, GoesOnAcrossItsBorders) {
       EXPECT_LT(distance(a, b), beside.x == -3 ? 0.25f : 0.1f) << beside.x << " " << beside.y;
     }
 }
-// sqrt(2) is reached at the ends of the x and y axes.
 TEST(Octahedron, PlacesMoveNoFasterThanDirectionsTurn) {
   Pcg32 random(2);
-  float fastest = 0;
+  float fastest = 0, above = 0, below = 0;
   for (int i = 0; i < 100000; ++i) {
     const Vec3 a = uniformSphere({random.next(), random.next()});
     const Vec3 b = normalize(a + uniformSphere({random.next(), random.next()}) * 1e-3f);
     if (a.x * b.x < 0 || a.y * b.y < 0 || a.z * b.z < 0) continue;  // it may go on beyond a border
     const Vec2 moved = toOctahedron(a) - toOctahedron(b);
-    fastest = std::max(fastest, std::max(std::fabs(moved.x), std::fabs(moved.y)) / distance(a, b));
+    const float speed = std::max(std::fabs(moved.x), std::fabs(moved.y)) / distance(a, b);
+    fastest = std::max(fastest, speed);
+    above = std::max(above, speed / octahedralSpeed(a));
+    below = std::max(below, octahedralSpeed(a) / kOctahedralSpeed);
   }
-  EXPECT_LT(fastest, kOctahedralSpeed * 1.01f);
-  EXPECT_GT(fastest, kOctahedralSpeed * 0.9f);
+  EXPECT_NEAR(fastest, kOctahedralSpeed, 0.1f) << "at the ends of the x and y axes";
+  EXPECT_NEAR(above, 1, 0.01f);
+  EXPECT_NEAR(below, 1, 0.01f);
+}
+// Shadow maps count on this: the speed does not grow much within an angle.
+TEST(Octahedron, WithinAnAngleTheSpeedIsBounded) {
+  Pcg32 random(3);
+  float most = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const Vec3 a = uniformSphere({random.next(), random.next()});
+    const Vec3 b = normalize(a + uniformSphere({random.next(), random.next()}) * random.next());
+    const float angle = std::acos(clamp(dot(a, b), -1, 1));
+    most = std::max(most, octahedralSpeed(b) / std::min(octahedralSpeed(a) * (1 + 4 * angle), kOctahedralSpeed));
+  }
+  EXPECT_LT(most, 1.01f);
 }
 
 /// A closed room of 2 x 2 x 2 with two columns, a ball and a disk in it.

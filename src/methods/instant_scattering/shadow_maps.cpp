@@ -28,7 +28,7 @@ class MapCanvas {
     const float plane = dot(center, disk.normal), r2 = disk.radius * disk.radius;
     const OctahedralTexel middle = octahedralTexel(center, resolution_);
     if (std::fabs(plane) < kFlat * d) return;
-    const int reach = texelsWithin(disk.radius / d);
+    const int reach = texelsWithin(center / d, disk.radius / d);
     for (int y = -reach; y <= reach; ++y)
       for (int x = -reach; x <= reach; ++x) {
         const OctahedralTexel texel = wrapOctahedral({middle.x + x, middle.y + y}, resolution_);
@@ -43,11 +43,13 @@ class MapCanvas {
   void closeHoles() { closeHoles(depths_, resolution_, kHoleLevels); }
 
  private:
-  /// Half the side of a square that holds all directions within the angle whose sine this is.
-  int texelsWithin(float sine) const {
+  /// Half the side of a square that holds all directions within the angle about `middle` whose sine this is.
+  int texelsWithin(Vec3 middle, float sine) const {
     const float angle = sine < 1 ? std::asin(sine) : kPi;
+    // The speed changes by less than this factor within the angle.
+    const float speed = std::min(octahedralSpeed(middle) * (1 + 4 * angle), kOctahedralSpeed);
     const float half = 0.5f * static_cast<float>(resolution_);
-    return static_cast<int>(std::ceil(std::min(kOctahedralSpeed * angle, 1.f) * half));
+    return static_cast<int>(std::ceil(std::min(speed * angle, 1.f) * half));
   }
   void lower(OctahedralTexel texel, float t) {
     float& depth = depths_[static_cast<size_t>(texel.index(resolution_))];
