@@ -35,7 +35,8 @@ class ImsMethod final : public Method {
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const VirtualLights lights = traceVirtualLights(
-        *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
+        *scene_,
+        {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2), options.flights},
         {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
     const bool maps = options.visibility.mode == LightVisibilityOptions::Mode::shadowMap;

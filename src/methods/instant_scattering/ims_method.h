@@ -11,6 +11,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"samples", "16", "fast: samples of each of these pixels in a pass"},
     {"spacing", "8", "fast: their distance in either direction [pixels]"},
     {"walks", "8192; 256 with shadow maps", "random walks from the lights in each pass"},
+    {"walk_flights", "tracking",
+     "of these walks through heterogeneous media: tracking; marching: in steps of half a cell of the grid (biased)"},
     {"lights", "8; 1 where a medium is heterogeneous",
      "single virtual lights that light a vertex, where no number of walks is given"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},

@@ -16,6 +16,7 @@ constexpr std::string_view kCompensate[] = {"path", "sampled", "none"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
 constexpr std::string_view kVisibility[] = {"exact", "shadow_map", "minimum_depth", "none"};
+constexpr std::string_view kFlights[] = {"tracking", "marching"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Random walks in each pass; shadow maps take time and memory for each of their lights.
@@ -45,6 +46,7 @@ float extentOf(const SceneView& scene) {
 bool ImsOptions::biased() const {
   if (mode == Mode::fast) return true;
   if (show != Show::picture || compensate == Compensate::none) return true;
+  if (flights == FlightMode::marching) return true;
   using Seen = LightVisibilityOptions::Mode;
   if (visibility.mode == Seen::shadowMap || visibility.mode == Seen::none) return true;
   if (compensate != Compensate::sampled) return false;
@@ -63,6 +65,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.visibility.points = reader.integer("map_points", 1).value_or(o.visibility.points);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
   o.walks = reader.integer("walks", 1).value_or(maps ? kWalksWithMaps : kWalks);
+  o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
@@ -94,6 +97,7 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   o.path.rrDepth = rrDepth_.value_or(scene.integrator.rrDepth);
   const bool tracked = std::any_of(scene.view.media.begin(), scene.view.media.end(),
                                    [](const MediumView& medium) { return !medium.homogeneous; });
+  if (!tracked) o.flights = FlightMode::tracking;  // it is the same, and exact
   for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
     amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
   o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
@@ -107,6 +111,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
+          {"walk_flights", wordOf(kFlights, o.flights)},
           {"lights", std::to_string(o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
           {"radius", fmt::format("{}", c.radius)},

@@ -16,6 +16,7 @@ struct ImsOptions {
   int samples = 16;  ///< fast: of a coarse pixel in each pass
   int spacing = 8;   ///< fast: of coarse pixels [pixels]
   int walks = 0;
+  FlightMode flights = FlightMode::tracking;  ///< of the walks
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray
   GatherOptions gather;
