@@ -17,25 +17,28 @@ constexpr int kLeastParts = 3;
 /// One map in the making.
 class MapCanvas {
  public:
-  MapCanvas(int resolution, const std::vector<Vec3>& directions)
-      : resolution_(resolution), directions_(directions), depths_(directions.size(), kInfinity) {}
+  MapCanvas(int resolution, const ShadowMaps::Directions& directions)
+      : resolution_(resolution), directions_(directions), depths_(directions.x.size(), kInfinity) {}
 
   const std::vector<float>& depths() const { return depths_; }
 
   /// `center`: of the disk, as seen from the light.
   void draw(const SurfaceDisk& disk, Vec3 center) {
-    const float d2 = lengthSquared(center), d = std::sqrt(d2);
-    const float plane = dot(center, disk.normal), r2 = disk.radius * disk.radius;
+    const float d = length(center);
+    const Seen seen{center, disk.normal, dot(center, disk.normal), square(disk.radius)};
+    if (std::fabs(seen.plane) < kFlat * d) return;
     const OctahedralTexel middle = octahedralTexel(center, resolution_);
-    if (std::fabs(plane) < kFlat * d) return;
     const int reach = texelsWithin(center / d, disk.radius / d);
-    for (int y = -reach; y <= reach; ++y)
-      for (int x = -reach; x <= reach; ++x) {
-        const OctahedralTexel texel = wrapOctahedral({middle.x + x, middle.y + y}, resolution_);
-        const Vec3 w = directions_[static_cast<size_t>(texel.index(resolution_))];
-        const float t = plane / dot(w, disk.normal);
-        if (t > 0 && lengthSquared(w * t - center) < r2) lower(texel, t);
-      }
+    const int end = resolution_ - 1;
+    const int x0 = middle.x - reach, x1 = middle.x + reach, y0 = middle.y - reach, y1 = middle.y + reach;
+    const bool overX = x0 < 0 || x1 > end, overY = y0 < 0 || y1 > end;
+    if (overX && overY) return drawTexels(seen, 0, end, 0, end);
+    drawTexels(seen, x0, x1, y0, y1);
+    // What lies beyond a border lies inside, mirrored: wrapOctahedral().
+    if (x0 < 0) drawTexels(seen, 0, -1 - x0, end - y1, end - y0);
+    if (x1 > end) drawTexels(seen, 2 * end + 1 - x1, end, end - y1, end - y0);
+    if (y0 < 0) drawTexels(seen, end - x1, end - x0, 0, -1 - y0);
+    if (y1 > end) drawTexels(seen, end - x1, end - x0, 2 * end + 1 - y1, end);
   }
 
   /// Squares of 2 x 2 texels, of 4 x 4, ... take the farthest depth of their parts, and hand it down to those that have
@@ -43,17 +46,41 @@ class MapCanvas {
   void closeHoles() { closeHoles(depths_, resolution_, kHoleLevels); }
 
  private:
+  /// A disk, as the light sees it.
+  struct Seen {
+    Vec3 center, normal;
+    float plane;    ///< dot(center, normal)
+    float radius2;  ///< square of its radius
+  };
+
+  /// The depth in a direction, if the disk is there, and else the one that was.
+  static float depthIn(const Seen& seen, float x, float y, float z, float depth) {
+    const float t = seen.plane / (x * seen.normal.x + y * seen.normal.y + z * seen.normal.z);
+    const float dx = x * t - seen.center.x, dy = y * t - seen.center.y, dz = z * t - seen.center.z;
+    const bool hit = (dx * dx + dy * dy + dz * dz < seen.radius2) & (t > 0) & (t < depth);
+    return hit ? t : depth;
+  }
+  /// Those from x0 to x1 and y0 to y1 that there are, in whole blocks: any texel may be drawn, each is drawn as it
+  /// ought to be.
+  void drawTexels(const Seen& seen, int x0, int x1, int y0, int y1) {
+    constexpr int kBlock = ShadowMaps::Directions::kBlock;
+    const float *wx = directions_.x.data(), *wy = directions_.y.data(), *wz = directions_.z.data();
+    float* depth = depths_.data();
+    for (int y = std::max(y0, 0); y <= std::min(y1, resolution_ - 1); ++y) {
+      const int row = y * resolution_, end = row + std::min(x1, resolution_ - 1);
+      for (int first = row + std::max(x0, 0); first <= end; first += kBlock)
+#pragma omp simd
+        for (int i = first; i < first + kBlock; ++i) depth[i] = depthIn(seen, wx[i], wy[i], wz[i], depth[i]);
+    }
+  }
+
   /// Half the side of a square that holds all directions within the angle about `middle` whose sine this is.
   int texelsWithin(Vec3 middle, float sine) const {
-    const float angle = sine < 1 ? std::asin(sine) : kPi;
+    const float angle = sine < 1 ? sine * (1 + 0.571f * square(sine)) : kPi;  // more than the arc sine
     // The speed changes by less than this factor within the angle.
     const float speed = std::min(octahedralSpeed(middle) * (1 + 4 * angle), kOctahedralSpeed);
     const float half = 0.5f * static_cast<float>(resolution_);
     return static_cast<int>(std::ceil(std::min(speed * angle, 1.f) * half));
-  }
-  void lower(OctahedralTexel texel, float t) {
-    float& depth = depths_[static_cast<size_t>(texel.index(resolution_))];
-    depth = std::min(depth, t);
   }
   static void closeHoles(std::vector<float>& fine, int size, int levels) {
     const int half = size / 2;
@@ -78,7 +105,7 @@ class MapCanvas {
   }
 
   int resolution_;
-  const std::vector<Vec3>& directions_;
+  const ShadowMaps::Directions& directions_;
   std::vector<float> depths_;
 };
 
@@ -97,13 +124,18 @@ bool mayBlock(const LightVertex& light, Vec3 center) {
 
 }  // namespace
 
+ShadowMaps::Directions::Directions(int resolution) {
+  for (int v = 0; v < resolution; ++v)
+    for (int u = 0; u < resolution; ++u) {
+      const Vec3 w = octahedralDirection({u, v}, resolution);
+      x.push_back(w.x), y.push_back(w.y), z.push_back(w.z);
+    }
+  for (std::vector<float>* c : {&x, &y, &z}) c->resize(c->size() + kBlock);
+}
+
 ShadowMaps::ShadowMaps(const SurfacePoints& points, std::span<const LightVertex> lights,
                        const ShadowMapOptions& options, const std::stop_token& stop)
-    : options_(options) {
-  const int resolution = options.resolution;
-  directions_.reserve(texels());
-  for (int y = 0; y < resolution; ++y)
-    for (int x = 0; x < resolution; ++x) directions_.push_back(octahedralDirection({x, y}, resolution));
+    : options_(options), directions_(options.resolution) {
   depths_.resize(lights.size() * texels());
   parallelFor(static_cast<int64_t>(lights.size()), 4, [&](int64_t i) {
     if (stop.stop_requested()) return;
@@ -121,7 +153,8 @@ void ShadowMaps::draw(const SurfacePoints& points, const LightVertex& light, siz
   }
   canvas.closeHoles();
   uint16_t* out = depths_.data() + index * texels();
-  for (const float depth : canvas.depths()) *out++ = upperHalf(depth);
+  std::transform(canvas.depths().begin(), canvas.depths().begin() + static_cast<std::ptrdiff_t>(texels()), out,
+                 upperHalf);
 }
 
 }  // namespace virga

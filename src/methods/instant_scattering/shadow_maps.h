@@ -50,6 +50,15 @@ struct ShadowMapOptions {
 /// All surfaces block, glass as well; the boundaries of media do not.
 class ShadowMaps {
  public:
+  /// Directions of a map's texels, coordinate by coordinate; with a block of zeros behind them, for vector code.
+  struct Directions {
+    static constexpr int kBlock = 8;
+    std::vector<float> x, y, z;
+
+    Directions() = default;
+    explicit Directions(int resolution);
+  };
+
   ShadowMaps() = default;
   /// In parallel; each map is a function of the points, the options, the light and its number alone. A stop leaves maps
   /// undefined.
@@ -70,7 +79,7 @@ class ShadowMaps {
   size_t texels() const { return static_cast<size_t>(options_.resolution) * static_cast<size_t>(options_.resolution); }
 
   ShadowMapOptions options_;
-  std::vector<Vec3> directions_;  ///< of the texels
+  Directions directions_;
   std::vector<uint16_t> depths_;
 };
 
