@@ -139,7 +139,7 @@ def compared(image, reference, *options):
 def lights_of(scene, walks):
     """Lights of the first pass: what it refuses to make maps for."""
     done = virga("render", scene, "-m", "ims", "--passes", 1, "--size", "8x8", "-q", "-o", OUT / "ims.exr", "--set", "ims.visibility=shadow_map",
-                 "--set", "ims.map_resolution=16384", "--set", f"ims.walks={walks}")
+                 "--set", "ims.map_resolution=1024", "--set", f"ims.walks={walks}")
     found = re.search(r"maps of (\d+) virtual lights", done.stderr)
     return int(found.group(1)) if found else 0
 
@@ -186,7 +186,7 @@ class Scene:
             yield f"| {title} | {self.name} | {result['relmse']:.5f} | {100 * result['bias']:.1f} % | {taken:.2f} |"
 
     def lights(self, count, difference=None):
-        sample = 256
+        sample = 4096
         walks = max(1, round(count * sample / max(1, lights_of(self.file, sample))))
         errors = []
         for seed in (1, 2):

@@ -131,15 +131,36 @@ TEST(LightVisibility, WhatIsBiasedSaysSo) {
   EXPECT_TRUE(biased("none"));
 }
 
-TEST(LightVisibility, TooManyMapsAreRefused) {
+void expectRefusal(SettingValues settings, const std::string& message) {
+  settings["visibility"] = "shadow_map";
   try {
-    rendered(foggyRoom(), {.passes = 1,
-                           .method = "ims",
-                           .settings = {{"visibility", "shadow_map"}, {"walks", "20000"}, {"map_resolution", "256"}}});
-    FAIL() << "it should have been refused";
+    rendered(foggyRoom(), {.passes = 1, .method = "ims", .settings = settings});
+    FAIL() << "it should have been refused: " << message;
   } catch (const Error& e) {
-    EXPECT_NE(std::string(e.what()).find("would take"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find(message), std::string::npos) << e.what();
   }
+}
+TEST(LightVisibility, WhatTakesTooMuchMemoryIsRefused) {
+  expectRefusal({{"walks", "20000"}, {"map_resolution", "256"}}, "would take");
+  expectRefusal({{"map_resolution", "5000"}}, "map_resolution may be at most 1024");
+  expectRefusal({{"map_points", "1000000000"}}, "map_points may be at most");
+}
+TEST(LightVisibility, WithoutLightsOrSurfacesThereIsNothingToSee) {
+  const std::string camera = pinpointSensor("0, 0, 4", "0, 0, 0", "0, 1, 0", 4);
+  const std::string fog =
+      R"(<shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"/></shape>)";
+  for (const char* visibility : {"minimum_depth", "shadow_map", "none"})
+    for (const std::string& scene : {camera, fog + camera, R"(<shape type="cube"/>)" + camera}) {
+      const virga::testing::Run run{
+          .passes = 1, .method = "ims", .settings = {{"visibility", visibility}, {"walks", "20"}}};
+      EXPECT_EQ(meanOf(rendered(sceneOf(scene), run).film().beauty()), 0) << visibility;
+      const Image lit = rendered(sceneOf(scene + R"(<emitter type="point"><point name="position" x="0" y="0" z="3"/>
+        </emitter>)"),
+                                 run)
+                            .film()
+                            .beauty();
+      EXPECT_TRUE(std::isfinite(meanOf(lit))) << visibility;
+    }
 }
 
 }  // namespace

@@ -63,6 +63,10 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.visibility.mode = static_cast<LightVisibilityOptions::Mode>(reader.choice("visibility", kVisibility).value_or(0));
   o.visibility.resolution = reader.integer("map_resolution", 1).value_or(o.visibility.resolution);
   o.visibility.points = reader.integer("map_points", 1).value_or(o.visibility.points);
+  if (o.visibility.resolution > LightVisibilityOptions::kMostResolution)
+    throw Error(fmt::format("--set ims.map_resolution may be at most {}", LightVisibilityOptions::kMostResolution));
+  if (o.visibility.points > LightVisibilityOptions::kMostPoints)
+    throw Error(fmt::format("--set ims.map_points may be at most {}", LightVisibilityOptions::kMostPoints));
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
   o.walks = reader.integer("walks", 1).value_or(maps ? kWalksWithMaps : kWalks);
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));

@@ -17,6 +17,8 @@ struct LightVisibilityOptions {
   };
   static constexpr size_t kMostMemory = size_t{1} << 30;  ///< that shadow maps may take [bytes]
 
+  static constexpr int kMostResolution = 1024, kMostPoints = 1'000'000;
+
   Mode mode = Mode::exact;
   int resolution = 128;  ///< of shadow maps
   int points = 8192;     ///< of the scene's surfaces in each
