@@ -4,118 +4,11 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
-#include <variant>
-
 #include "core/error.h"
+#include "rays/analytic_shapes.h"
 
 namespace virga {
 namespace {
-
-struct Sphere {
-  Vec3 center;
-  float radius;
-};
-struct Disk {
-  Vec3 center, normal;
-  float radius;
-};
-struct Cylinder {
-  Vec3 end, axis;
-  float radius, length;
-};
-struct Box {
-  Affine toLocal;
-};
-using Analytic = std::variant<Sphere, Disk, Cylinder, Box>;
-
-/// One point where a line meets an analytic shape.
-struct LineHit {
-  float t;
-  bool entering;
-};
-struct LineHits {
-  LineHit hit[2];
-  int count = 0;
-};
-
-// In double precision: far away, the discriminant of a small sphere cancels in float.
-LineHits intersect(const Sphere& s, Vec3 o, Vec3 d) {
-  const double ox = double{o.x} - double{s.center.x}, oy = double{o.y} - double{s.center.y},
-               oz = double{o.z} - double{s.center.z};
-  const double dx = d.x, dy = d.y, dz = d.z;
-  const double a = dx * dx + dy * dy + dz * dz;
-  const double b = ox * dx + oy * dy + oz * dz;
-  // Squared distance from the centre to the line, without the cancellation of b^2 - a c.
-  const double px = ox - b / a * dx, py = oy - b / a * dy, pz = oz - b / a * dz;
-  const double r2 = double{s.radius} * double{s.radius};
-  const double discriminant = a * (r2 - (px * px + py * py + pz * pz));
-  if (!(discriminant > 0)) return {};
-  const double root = std::sqrt(discriminant);
-  return {{{static_cast<float>((-b - root) / a), true}, {static_cast<float>((-b + root) / a), false}}, 2};
-}
-
-LineHits intersect(const Disk& k, Vec3 o, Vec3 d) {
-  const float along = dot(k.normal, d);
-  if (along == 0) return {};
-  const float t = dot(k.normal, k.center - o) / along;
-  if (!(lengthSquared(o + d * t - k.center) <= k.radius * k.radius)) return {};
-  return {{{t, along < 0}, {}}, 1};
-}
-
-// In double precision, for the same reason as the sphere: in the plane across the axis, a circle.
-LineHits intersect(const Cylinder& c, Vec3 o, Vec3 d) {
-  const double axis[] = {double{c.axis.x}, double{c.axis.y}, double{c.axis.z}};
-  const double from[] = {double{o.x} - double{c.end.x}, double{o.y} - double{c.end.y}, double{o.z} - double{c.end.z}};
-  const double to[] = {double{d.x}, double{d.y}, double{d.z}};
-  const auto inner = [](const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
-  const double unit = inner(axis, axis), height = inner(from, axis) / unit, climb = inner(to, axis) / unit;
-  double p[3], q[3];
-  for (int i = 0; i < 3; ++i) p[i] = from[i] - height * axis[i], q[i] = to[i] - climb * axis[i];
-  const double a = inner(q, q), b = inner(p, q);
-  if (!(a > 0)) return {};
-  double nearest[3];
-  for (int i = 0; i < 3; ++i) nearest[i] = p[i] - b / a * q[i];
-  const double discriminant = a * (double{c.radius} * double{c.radius} - inner(nearest, nearest));
-  if (!(discriminant > 0)) return {};
-  const double root = std::sqrt(discriminant);
-  LineHits hits;
-  for (const double side : {-1.0, 1.0}) {
-    const double t = (-b + side * root) / a, z = height + t * climb;
-    if (z >= 0 && z <= double{c.length}) hits.hit[hits.count++] = {static_cast<float>(t), side < 0};
-  }
-  return hits;
-}
-
-LineHits intersect(const Box& box, Vec3 o, Vec3 d) {
-  const Vec3 lo = box.toLocal.point(o), ld = box.toLocal.vector(d);
-  float tEnter = -kInfinity, tLeave = kInfinity;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverse = 1 / ld[axis];
-    const float t0 = (-1 - lo[axis]) * inverse, t1 = (1 - lo[axis]) * inverse;
-    if (ld[axis] == 0) {
-      if (std::fabs(lo[axis]) >= 1) return {};
-      continue;
-    }
-    tEnter = std::max(tEnter, std::min(t0, t1));
-    tLeave = std::min(tLeave, std::max(t0, t1));
-  }
-  if (!(tEnter < tLeave)) return {};
-  return {{{tEnter, true}, {tLeave, false}}, 2};
-}
-
-Bounds boundsOf(const Sphere& s) { return {s.center - Vec3(s.radius), s.center + Vec3(s.radius)}; }
-
-Bounds boundsOf(const Disk& k) {
-  const auto half = [&](float n) { return k.radius * std::sqrt(std::max(0.f, 1 - n * n)); };
-  const Vec3 h(half(k.normal.x), half(k.normal.y), half(k.normal.z));
-  return {k.center - h, k.center + h};
-}
-
-Bounds boundsOf(const Cylinder& c) {
-  Bounds b = boundsOf(Disk{c.end, c.axis, c.radius});
-  b.extend(boundsOf(Disk{c.end + c.axis * c.length, c.axis, c.radius}));
-  return b;
-}
 
 struct DeviceHolder {
   RTCDevice device = rtcNewDevice(nullptr);
@@ -234,6 +127,55 @@ void recordCrossing(const RTCFilterFunctionNArguments* args) {
   args->valid[0] = 0;
 }
 
+/// What a search for the nearest shape looks for.
+struct ClearanceQuery {
+  const std::vector<std::shared_ptr<const RayShape>>& shapes;
+  Vec3 p;
+  std::span<const Vec3> sides;
+
+  /// Something that reaches so far along a direction, and has coordinates of such a size.
+  template <class FarthestAlong>
+  bool counts(float size, const FarthestAlong& farthestAlong) const {
+    const float error = 1e-5f * std::max(size, maxComponent(abs(p)));
+    return sides.empty() ||
+           std::any_of(sides.begin(), sides.end(), [&](Vec3 n) { return farthestAlong(n) - dot(n, p) > error; });
+  }
+};
+
+float distanceOf(const RayShape::Impl& shape, unsigned primitive, const ClearanceQuery& query) {
+  if (std::holds_alternative<std::monostate>(shape.analytic)) {
+    const auto* positions =
+        static_cast<const Vec3*>(rtcGetGeometryBufferData(shape.geometry, RTC_BUFFER_TYPE_VERTEX, 0));
+    const auto* t = static_cast<const uint32_t*>(rtcGetGeometryBufferData(shape.geometry, RTC_BUFFER_TYPE_INDEX, 0));
+    const Vec3 a = positions[t[3 * primitive]], b = positions[t[3 * primitive + 1]],
+               c = positions[t[3 * primitive + 2]];
+    const float size = maxComponent(max(abs(a), max(abs(b), abs(c))));
+    const bool counts = query.counts(size, [&](Vec3 n) { return std::max(dot(n, a), std::max(dot(n, b), dot(n, c))); });
+    return counts ? distanceToTriangle(query.p, a, b, c) : kInfinity;
+  }
+  return std::visit(
+      [&](const auto& s) -> float {
+        using Shape = std::decay_t<decltype(s)>;
+        if constexpr (std::is_same_v<Shape, std::monostate> || std::is_same_v<Shape, Box>) {
+          return lowerDistance(shape.bounds, query.p);
+        } else {
+          const float size = maxComponent(max(abs(shape.bounds.lo), abs(shape.bounds.hi)));
+          const bool counts = query.counts(size, [&](Vec3 n) { return farthestAlong(s, n); });
+          return counts ? lowerDistance(s, query.p) : kInfinity;
+        }
+      },
+      shape.analytic);
+}
+
+// Shrinks the search to what it has found.
+bool clearanceCallback(RTCPointQueryFunctionArguments* args) {
+  const auto& query = *static_cast<const ClearanceQuery*>(args->userPtr);
+  const float d = distanceOf(query.shapes[args->geomID]->impl(), args->primID, query);
+  if (!(d < args->query->radius)) return false;
+  args->query->radius = d;
+  return true;
+}
+
 std::shared_ptr<const RayShape> analyticShape(const Analytic& shape, const Bounds& bounds) {
   auto impl = std::make_unique<RayShape::Impl>();
   std::visit([&](const auto& s) { impl->analytic = s; }, shape);
@@ -332,6 +274,16 @@ bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
   RTCRay q{ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   rtcOccluded1(impl_->scene, &context.embree, &q);
   return q.tfar < 0;
+}
+
+float RayScene::clearance(Vec3 p, std::span<const Vec3> sides) const {
+  if (shapes_.empty()) return kInfinity;
+  ClearanceQuery query{shapes_, p, sides};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  RTCPointQuery q{p.x, p.y, p.z, 0, kInfinity};
+  rtcPointQuery(impl_->scene, &q, &context, clearanceCallback, &query);
+  return q.radius;
 }
 
 void RayScene::crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const {

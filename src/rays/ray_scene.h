@@ -46,6 +46,10 @@ class RayScene {
   RayHit nearest(const Ray& ray, float tMin, float tMax) const;
   /// Anything with tMin < t < tMax?
   bool occluded(const Ray& ray, float tMin, float tMax) const;
+  /// A lower bound of the distance from p to any shape, infinity where there is none: for triangles, spheres and disks
+  /// the distance itself, within its rounding. Shapes that nowhere rise above a plane through p with one of the unit
+  /// `sides` as its normal (beyond the errors of coordinates) do not count; without sides, all do.
+  float clearance(Vec3 p, std::span<const Vec3> sides) const;
   /// All crossings with 0 <= tMin <= t <= tMax (those of triangles: tMin < t). The same ray finds them at the same t in
   /// every call.
   void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const;

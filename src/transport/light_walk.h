@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/sampler.h"
+#include "transport/marched_flight.h"
 #include "transport/roulette.h"
 #include "transport/vertex.h"
 
@@ -27,8 +28,9 @@ struct alignas(64) LightVertex {
 template <class Rays>
 class LightWalker {
  public:
-  VIRGA_HD LightWalker(const SceneView& scene, const Rays& rays, int maxDepth)
-      : scene_(scene), rays_(rays), maxDepth_(maxDepth) {}
+  VIRGA_HD LightWalker(const SceneView& scene, const Rays& rays, int maxDepth,
+                       FlightMode flights = FlightMode::tracking)
+      : scene_(scene), rays_(rays), maxDepth_(maxDepth), flights_(flights) {}
 
   /// From `start`, which carries `flux`. visit(vertex, scattering) at each vertex in a medium or on a broad bsdf
   /// (Bsdf::broad); `scattering` is null in media. maxDepth: scattering events; -1: no limit.
@@ -63,13 +65,19 @@ class LightWalker {
     SpectralFlight spectral(state.flux, scene_.chromatic ? one(state, sampler) : 0.f);
     walkMedia(scene_, rays_, flown, hit.t, [&](float t0, float t1) {
       if (flown.media.vacuum()) return true;
-      collision = scene_.chromatic ? sampleCollision(scene_, flown, t0, t1, sampler.stream(), spectral)
-                                   : sampleCollision(scene_, flown, t0, t1, sampler.stream());
+      collision = scene_.chromatic ? collide(flown, t0, t1, sampler.stream(), spectral)
+                                   : collide(flown, t0, t1, sampler.stream());
       return !collision.found();
     });
     if (scene_.chromatic) state.flux *= spectral.weight(state.flux);
     if (collision.found()) return scatterInMedium(state, flown.media, collision, sampler, visit);
     return hit.found() && scatterOnSurface(state, flown.media, hit, sampler, visit);
+  }
+
+  template <class... Spectral>
+  VIRGA_HD Collision collide(const MediaRay& r, float t0, float t1, Pcg32& random, Spectral&... spectral) const {
+    return flights_ == FlightMode::marching ? marchCollision(scene_, r, t0, t1, random, spectral...)
+                                            : sampleCollision(scene_, r, t0, t1, random, spectral...);
   }
 
   template <class Visit>
@@ -136,6 +144,7 @@ class LightWalker {
   const SceneView& scene_;
   const Rays& rays_;
   int maxDepth_;
+  FlightMode flights_;
 };
 
 }  // namespace virga

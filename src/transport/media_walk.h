@@ -131,20 +131,26 @@ struct Collision {
   VIRGA_HD bool found() const { return medium >= 0; }
 };
 
-/// The first real collision within [t0, t1] in the media of the state. Coefficients add where media overlap, so the
-/// collision is the nearest of independent free flights.
-/// `spectral`, where there is one, takes part (SpectralFlight).
-template <class... Spectral>
-VIRGA_HD Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1, Pcg32& random,
-                                   Spectral&... spectral) {
+/// The first collision before t1 in the media of the state. Coefficients add where media overlap, so it is the nearest
+/// of independent free flights: flight(medium, end) returns the distance of one, or infinity.
+template <class Flight>
+VIRGA_HD Collision nearestCollision(const MediaState& media, float t1, Flight&& flight) {
   Collision nearest;
-  for (int i = 0; i < r.media.count(); ++i) {
-    const int medium = r.media.medium(i);
-    const float end = std::min(t1, nearest.t);
-    const float t = sampleFreeFlight(scene.media[medium], r.ray, t0, end, random, spectral...);
+  for (int i = 0; i < media.count(); ++i) {
+    const int medium = media.medium(i);
+    const float t = flight(medium, std::min(t1, nearest.t));
     if (t < nearest.t) nearest = {t, medium};
   }
   return nearest;
+}
+
+/// The first real collision within [t0, t1]. `spectral`, where there is one, takes part (SpectralFlight).
+template <class... Spectral>
+VIRGA_HD Collision sampleCollision(const SceneView& scene, const MediaRay& r, float t0, float t1, Pcg32& random,
+                                   Spectral&... spectral) {
+  return nearestCollision(r.media, t1, [&](int medium, float end) {
+    return sampleFreeFlight(scene.media[medium], r.ray, t0, end, random, spectral...);
+  });
 }
 
 /// Unbiased estimate of the light that the media of the state add along [t0, t1] [W/(m^2 sr)].

@@ -25,7 +25,7 @@ constexpr int kBlock = 64;
 VirtualLights traceBlock(const Scene& scene, const WalkStarts& starts, const WalkOptions& options, const SampleId& id,
                          int first, int end) {
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const LightWalker<EmbreeRays> walker(scene.view, rays, options.maxDepth);
+  const LightWalker<EmbreeRays> walker(scene.view, rays, options.maxDepth, options.flights);
   VirtualLights block;
   for (int w = first; w < end; ++w) {
     block.firstOf.push_back(static_cast<uint32_t>(block.lights.size()));

@@ -21,6 +21,7 @@ struct VirtualLights {
 struct WalkOptions {
   int walks = 1024;
   int maxDepth = -1;  ///< scattering events; -1: no limit
+  FlightMode flights = FlightMode::tracking;
 };
 
 /// Walks number 0, 1, ... of a scene, the same for every number of threads. `id` names the set: its stream is not used,

@@ -35,14 +35,15 @@ class Compensation {
                const CompensationOptions& options)
       : scene_(scene), rays_(rays), tracer_(tracer), gatherer_(gatherer), options_(options) {}
 
-  /// Adds to `radiance` what clamping has taken at a vertex. `layers` ends with it; `events` came before it.
-  void compensate(const Record& at, const LayerPath& layers, int events, LayerRadiance& radiance, Sampler& sampler,
-                  int level = 1) const {
+  /// Adds to `radiance` what clamping has taken at a vertex. `layers` ends with it; `events` came before it; `known` is
+  /// what gathering there has told about the surfaces around.
+  void compensate(const Record& at, const KnownSpace& known, const LayerPath& layers, int events,
+                  LayerRadiance& radiance, Sampler& sampler, int level = 1) const {
     if (options_.levels >= 0 && level > options_.levels) return;
     const int count = options_.vertices[level > 1];
     for (int i = 0; i < count; ++i) {
       Record next;
-      if (!findVertex(at, next, sampler)) continue;
+      if (!findVertex(at, known, next, sampler)) continue;
       next.throughput *= 1 / static_cast<float>(count);
       // As many go on as the light they bring is worth; from the third level on that is less than one in all, or
       // recursion in dense media would never end.
@@ -78,8 +79,9 @@ class Compensation {
   }
   void gather(const Record& at, Path& path, int events, Sampler& sampler, int level) const {
     const bool last = options_.levels >= 0 && level >= options_.levels;
-    gatherer_.gather(at, events, path, options_.amounts[level > 1], last ? lastBound() : gatherer_.bound(), sampler);
-    compensate(at, path.layers, events, path.radiance, sampler, level + 1);
+    const KnownSpace known = gatherer_.gather(at, events, path, options_.amounts[level > 1],
+                                              last ? lastBound() : gatherer_.bound(), sampler);
+    compensate(at, known, path.layers, events, path.radiance, sampler, level + 1);
   }
   float lastBound() const {
     switch (options_.ending) {
@@ -93,14 +95,14 @@ class Compensation {
   }
 
   /// x' and the throughput to it; false where there is nothing.
-  bool findVertex(const Record& at, Record& next, Sampler& sampler) const {
+  bool findVertex(const Record& at, const KnownSpace& known, Record& next, Sampler& sampler) const {
     const Vertex& x = at.vertex;
     const auto direction = x.sample(sampler.random2D(), sampler.random());
     if (!(direction.pdf > 0)) return false;
     MediaRay r = x.leave(scene_, direction.wi);
     const RestrictedDistance distances{localMean(r.media, x.p), options_.radius};
-    const RayHit hit = rays_.nearest(r.ray, options_.radius);
     const float t = distances.sample(sampler.random2D());
+    const RayHit hit = gatherer_.isFree(known, x.p, direction.wi, t) ? RayHit{} : rays_.nearest(r.ray, options_.radius);
     const bool onSurface = hit.found() && hit.t < t;
     const float end = onSurface ? hit.t : t;
     const float density = onSurface ? distances.beyond(hit.t) : distances.pdf(t);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "methods/instant_scattering/light_visibility.h"
 #include "methods/path/path_tracer.h"
-#include "transport/virtual_lights.h"
 
 namespace virga {
 
@@ -15,7 +15,6 @@ struct GatherAmount {
 struct GatherOptions {
   float bound = 0;         ///< b of the clamped geometry term [1/unit^2], > 0
   int maxDepth = -1;       ///< of whole paths, in segments; -1: no limit
-  bool visibility = true;  ///< false: light passes surfaces
   bool lostLight = false;  ///< what clamping takes, max(0, G - b), in place of what it leaves
 };
 
@@ -26,15 +25,18 @@ class Gatherer {
   using Path = typename PathTracer<Rays>::Path;
   using Record = typename PathTracer<Rays>::Record;
 
-  VIRGA_HD Gatherer(const SceneView& scene, const Rays& rays, const VirtualLights& lights, const GatherOptions& options)
-      : scene_(scene), rays_(rays), lights_(lights), options_(options) {}
+  VIRGA_HD Gatherer(const SceneView& scene, const Rays& rays, const VirtualLights& lights,
+                    const LightVisibilityView& visibility, const GatherOptions& options)
+      : scene_(scene), rays_(rays), lights_(lights), visibility_(visibility), options_(options) {}
 
   VIRGA_HD float bound() const { return options_.bound; }
 
-  /// Adds to the path's radiance. `at` is the last vertex of its layers; `events` is how many came before it.
-  VIRGA_HD void gather(const Record& at, int events, Path& path, const GatherAmount& amount, float bound,
-                       Sampler& sampler) const {
-    if (lights_.lights.empty()) return;
+  /// Adds to the path's radiance. `at` is the last vertex of its layers; `events` is how many came before it. Returns
+  /// what it has learnt about the surfaces around.
+  VIRGA_HD KnownSpace gather(const Record& at, int events, Path& path, const GatherAmount& amount, float bound,
+                             Sampler& sampler) const {
+    KnownSpace known;
+    if (lights_.lights.empty()) return known;
     const int all = amount.walks > 0 ? lights_.walks() : static_cast<int>(lights_.lights.size());
     const int count = amount.walks > 0 ? std::min(amount.walks, all) : amount.lights;
     // One of each of as many equal parts of the list: neighbours in it are of one walk.
@@ -49,30 +51,38 @@ class Gatherer {
     for (int j = 0; j < count; ++j) {
       const size_t i = pick(j);
       if (amount.walks == 0)
-        add(lights_.lights[i], at, events, path, share, bound, sampler);
+        add(i, at, events, path, share, bound, known, sampler);
       else
         for (size_t l = lights_.firstOf[i]; l < lights_.firstOf[i + 1]; ++l)
-          add(lights_.lights[l], at, events, path, share, bound, sampler);
+          add(l, at, events, path, share, bound, known, sampler);
     }
+    return known;
+  }
+  /// Is it known that no surface lies between x and a point in a direction w?
+  VIRGA_HD bool isFree(const KnownSpace& known, Vec3 x, Vec3 w, float t) const {
+    return visibility_.isFree(known, lights_.lights.data(), x + w * t, t);
   }
 
  private:
-  VIRGA_HD void add(const LightVertex& light, const Record& at, int events, Path& path, float share, float bound,
+  VIRGA_HD void add(size_t index, const Record& at, int events, Path& path, float share, float bound, KnownSpace& known,
                     Sampler& sampler) const {
+    const LightVertex& light = lights_.lights[index];
     if (options_.maxDepth >= 0 && events + 2 + light.depth > options_.maxDepth) return;
-    const Rgb found = from(light, at, bound, sampler);
+    const Rgb found = from(index, at, bound, known, sampler);
     if (isBlack(found)) return;
     LayerPath layers = path.layers;
     layers.scatter(light.kind);
     path.radiance.add(layers.layer(), found * share);
   }
   /// What one walk's light adds, as if there were no other walks.
-  VIRGA_HD Rgb from(const LightVertex& light, const Record& at, float bound, Sampler& sampler) const {
+  VIRGA_HD Rgb from(size_t index, const Record& at, float bound, KnownSpace& known, Sampler& sampler) const {
+    const LightVertex& light = lights_.lights[index];
     const Vertex& x = at.vertex;
     const Vec3 way = light.p - x.p;
     const float d2 = lengthSquared(way);
     if (!(d2 > 0)) return {};
-    const Vec3 w = way / std::sqrt(d2);
+    const float d = std::sqrt(d2);
+    const Vec3 w = way / d;
     const float cosine = generalCosine(light.normal, w), g = cosine * generalCosine(x.normal(), w) / d2;
     if (!(g > 0)) return {};
     // The vertex's own cosine is in its scattering: for shading normals it differs from that of the geometry.
@@ -81,7 +91,8 @@ class Gatherer {
     const Rgb value = at.throughput * x.scattering(w) * emitted(light, -w) * clamped;
     if (isBlack(value)) return {};
     ConnectingRay ray = aimAt(scene_, x.leave(scene_, w), light.p);
-    if (options_.visibility && rays_.occluded(ray.at.ray, ray.tMax)) return {};
+    if (visibility_.blocked(rays_, ray, x, w, d, index)) return {};
+    visibility_.learn(known, light, index, w, d);
     return value * passMedia(scene_, rays_, ray.at, ray.tMax, sampler.stream());
   }
   /// Intensity toward w, the cosine at a surface left out [W/sr].
@@ -95,6 +106,7 @@ class Gatherer {
   const SceneView& scene_;
   const Rays& rays_;
   const VirtualLights& lights_;
+  LightVisibilityView visibility_;
   const GatherOptions& options_;
 };
 

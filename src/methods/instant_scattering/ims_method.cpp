@@ -20,6 +20,7 @@ class ImsMethod final : public Method {
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
     scene_ = std::move(next);
     upsampling_ = nullptr;
+    points_ = {};
     refuse();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
@@ -34,10 +35,15 @@ class ImsMethod final : public Method {
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const VirtualLights lights = traceVirtualLights(
-        *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
+        *scene_,
+        {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2), options.flights},
         {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
-    const ImsPixels pixels(*scene_, lights, options);
+    const bool maps = options.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
+    if (maps && points_.cells() == 0) points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
+    const LightVisibility visibility(*scene_, lights, points_, options.visibility,
+                                     hash64(hash64(seed_ + replicate) + sample), stop);
+    const ImsPixels pixels(*scene_, lights, visibility.view(), options);
     const SampleId id{seed_, replicate, 0, sample};
     if (options.mode == ImsOptions::Mode::exact)
       exactPass(pixels, id, stop, frame);
@@ -118,6 +124,7 @@ class ImsMethod final : public Method {
 
   SceneSnapshot scene_;
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
+  SurfacePoints points_;                    ///< likewise
   Overlay overlay_;
   ImsSettings settings_;
   uint64_t seed_ = 0;

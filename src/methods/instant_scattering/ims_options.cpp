@@ -15,9 +15,12 @@ constexpr std::string_view kMode[] = {"exact", "fast"};
 constexpr std::string_view kCompensate[] = {"path", "sampled", "none"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
-constexpr std::string_view kVisibility[] = {"exact", "none"};
+constexpr std::string_view kVisibility[] = {"exact", "shadow_map", "minimum_depth", "none"};
+constexpr std::string_view kFlights[] = {"tracking", "marching"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
+/// Random walks in each pass; shadow maps take time and memory for each of their lights.
+constexpr int kWalks = 8192, kWalksWithMaps = 256;
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
@@ -42,7 +45,10 @@ float extentOf(const SceneView& scene) {
 
 bool ImsOptions::biased() const {
   if (mode == Mode::fast) return true;
-  if (show != Show::picture || !gather.visibility || compensate == Compensate::none) return true;
+  if (show != Show::picture || compensate == Compensate::none) return true;
+  if (flights == FlightMode::marching) return true;
+  using Seen = LightVisibilityOptions::Mode;
+  if (visibility.mode == Seen::shadowMap || visibility.mode == Seen::none) return true;
   if (compensate != Compensate::sampled) return false;
   return compensation.localMeanTransmittance ||
          (compensation.levels >= 0 && compensation.ending != CompensationOptions::Ending::unclamped);
@@ -54,12 +60,20 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
   o.samples = reader.integer("samples", 1).value_or(o.samples);
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
-  o.walks = reader.integer("walks", 1).value_or(o.walks);
+  o.visibility.mode = static_cast<LightVisibilityOptions::Mode>(reader.choice("visibility", kVisibility).value_or(0));
+  o.visibility.resolution = reader.integer("map_resolution", 1).value_or(o.visibility.resolution);
+  o.visibility.points = reader.integer("map_points", 1).value_or(o.visibility.points);
+  if (o.visibility.resolution > LightVisibilityOptions::kMostResolution)
+    throw Error(fmt::format("--set ims.map_resolution may be at most {}", LightVisibilityOptions::kMostResolution));
+  if (o.visibility.points > LightVisibilityOptions::kMostPoints)
+    throw Error(fmt::format("--set ims.map_points may be at most {}", LightVisibilityOptions::kMostPoints));
+  const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
+  o.walks = reader.integer("walks", 1).value_or(maps ? kWalksWithMaps : kWalks);
+  o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
-  o.gather.visibility = reader.choice("visibility", kVisibility).value_or(0) == 0;
   o.gather.lostLight = o.show == ImsOptions::Show::lost;
   CompensationOptions& c = o.compensation;
   c.levels = reader.integer("levels", -1).value_or(-1);
@@ -87,6 +101,7 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   o.path.rrDepth = rrDepth_.value_or(scene.integrator.rrDepth);
   const bool tracked = std::any_of(scene.view.media.begin(), scene.view.media.end(),
                                    [](const MediumView& medium) { return !medium.homogeneous; });
+  if (!tracked) o.flights = FlightMode::tracking;  // it is the same, and exact
   for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
     amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
   o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
@@ -100,6 +115,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
+          {"walk_flights", wordOf(kFlights, o.flights)},
           {"lights", std::to_string(o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
           {"radius", fmt::format("{}", c.radius)},
@@ -112,7 +128,9 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"p1", std::to_string(c.amounts[0].walks)},
           {"p2", std::to_string(c.amounts[1].walks)},
           {"transmittance", wordOf(kTransmittance, c.localMeanTransmittance ? 1 : 0)},
-          {"visibility", wordOf(kVisibility, o.gather.visibility ? 0 : 1)},
+          {"visibility", wordOf(kVisibility, o.visibility.mode)},
+          {"map_resolution", std::to_string(o.visibility.resolution)},
+          {"map_points", std::to_string(o.visibility.points)},
           {"show", wordOf(kShow, o.show)},
           {"max_depth", std::to_string(o.path.maxDepth)},
           {"rr_depth", std::to_string(o.path.rrDepth)}};

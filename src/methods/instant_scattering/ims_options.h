@@ -15,10 +15,12 @@ struct ImsOptions {
   Mode mode = Mode::exact;
   int samples = 16;  ///< fast: of a coarse pixel in each pass
   int spacing = 8;   ///< fast: of coarse pixels [pixels]
-  int walks = 8192;
+  int walks = 0;
+  FlightMode flights = FlightMode::tracking;  ///< of the walks
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray
   GatherOptions gather;
+  LightVisibilityOptions visibility;
   Compensate compensate = Compensate::path;
   CompensationOptions compensation;
   Show show = Show::picture;

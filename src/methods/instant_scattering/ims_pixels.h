@@ -16,12 +16,13 @@ class ImsPixels {
   /// All layers, or without those that virtual lights light: x1 alone.
   enum class Part { all, direct };
 
-  ImsPixels(const Scene& scene, const VirtualLights& lights, const ImsOptions& options)
+  ImsPixels(const Scene& scene, const VirtualLights& lights, const LightVisibilityView& visibility,
+            const ImsOptions& options)
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         options_(options),
         tracer_(scene_.view, rays_, options_.path),
-        gatherer_(scene_.view, rays_, lights, options_.gather),
+        gatherer_(scene_.view, rays_, lights, visibility, options_.gather),
         compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
         marched_(scene_.view, rays_) {}
   /// Is the light of lamps found by marching? Not where there are panes, which it does not see through, nor from lamps
@@ -69,10 +70,11 @@ class ImsPixels {
   using Tracer = PathTracer<EmbreeRays>;
 
   void lightVertex(const Tracer::Record& at, int events, Tracer::Path& path, Sampler& sampler) const {
+    KnownSpace known;
     if (options_.show != ImsOptions::Show::compensation)
-      gatherer_.gather(at, events, path, options_.amount, gatherer_.bound(), sampler);
+      known = gatherer_.gather(at, events, path, options_.amount, gatherer_.bound(), sampler);
     if (options_.show != ImsOptions::Show::lost && options_.compensate == ImsOptions::Compensate::sampled)
-      compensation_.compensate(at, path.layers, events, path.radiance, sampler);
+      compensation_.compensate(at, known, path.layers, events, path.radiance, sampler);
   }
 
   const Scene& scene_;
