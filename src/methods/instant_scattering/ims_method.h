@@ -7,10 +7,11 @@ namespace virga {
 
 inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
-     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased)"},
-    {"samples", "16", "fast: samples of each of these pixels in a pass"},
-    {"spacing", "8", "fast: their distance in either direction [pixels]"},
-    {"walks", "8192", "random walks from the lights in each pass"},
+     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing is "
+     "drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
+    {"samples", "16", "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
+    {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
+    {"walks", "8192; frame: 256", "random walks from the lights in each pass"},
     {"lights", "8; 1 where a medium is heterogeneous",
      "single virtual lights that light a vertex, where no number of walks is given"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},

@@ -11,8 +11,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kMode[] = {"exact", "fast"};
-constexpr std::string_view kCompensate[] = {"path", "sampled", "none"};
+constexpr std::string_view kMode[] = {"exact", "fast", "frame"};
+constexpr std::string_view kCompensate[] = {"path", "sampled", "none", "spread"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
 constexpr std::string_view kVisibility[] = {"exact", "none"};
@@ -20,6 +20,9 @@ constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
+/// The same where all virtual lights light everything, so that none must be seen by itself.
+constexpr float kFrameRadiusShare = 0.1f;
+constexpr int kFrameWalks = 256;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -41,7 +44,7 @@ float extentOf(const SceneView& scene) {
 }  // namespace
 
 bool ImsOptions::biased() const {
-  if (mode == Mode::fast) return true;
+  if (mode != Mode::exact) return true;
   if (show != Show::picture || !gather.visibility || compensate == Compensate::none) return true;
   if (compensate != Compensate::sampled) return false;
   return compensation.localMeanTransmittance ||
@@ -54,10 +57,11 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
   o.samples = reader.integer("samples", 1).value_or(o.samples);
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
-  o.walks = reader.integer("walks", 1).value_or(o.walks);
+  walks_ = reader.integer("walks", 1);
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
-  o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
   o.gather.visibility = reader.choice("visibility", kVisibility).value_or(0) == 0;
   o.gather.lostLight = o.show == ImsOptions::Show::lost;
@@ -75,8 +79,12 @@ ImsSettings::ImsSettings(const Settings& settings) {
   if (bound) radius_ = 1 / std::sqrt(*bound);
   if (o.show == ImsOptions::Show::compensation && o.compensate != ImsOptions::Compensate::sampled)
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
-  if (o.show != ImsOptions::Show::picture && o.mode == ImsOptions::Mode::fast)
-    throw Error("--set ims.show needs ims.mode=exact: fast does not tell parts of the picture apart");
+  if (o.show != ImsOptions::Show::picture && o.mode != ImsOptions::Mode::exact)
+    throw Error("--set ims.show needs ims.mode=exact: others do not tell parts of the picture apart");
+  if (isFrame && o.compensate == ImsOptions::Compensate::path)
+    throw Error("--set ims.compensation=path needs ims.mode=exact or fast: a frame follows no paths");
+  if (!isFrame && o.compensate == ImsOptions::Compensate::spread)
+    throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);
   rrDepth_ = reader.integer("rr_depth", 1);
 }
@@ -89,8 +97,14 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
                                    [](const MediumView& medium) { return !medium.homogeneous; });
   for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
     amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
-  o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  o.walks = walks_.value_or(isFrame ? kFrameWalks : o.walks);
+  o.compensation.radius = radius_.value_or((isFrame ? kFrameRadiusShare : kRadiusShare) * extentOf(scene.view));
   o.gather.bound = 1 / square(o.compensation.radius);
+  const bool spread = o.compensate == ImsOptions::Compensate::spread;
+  o.frame = {{spread ? NearField::Kind::spread : NearField::Kind::clamped, o.gather.bound},
+             o.path.maxDepth,
+             o.gather.visibility ? ReceiverBatch::Visibility::exact : ReceiverBatch::Visibility::none};
   return o;
 }
 

@@ -2,13 +2,10 @@
 #include "methods/instant_scattering/pixel_features.h"
 
 #include "core/parallel.h"
-#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/eye_march.h"
 
 namespace virga {
 namespace {
-
-/// Steps through each stretch of media.
-constexpr int kSteps = 64;
 
 /// Optical depth along a ray, gathered front to back.
 struct SeenMedia {
@@ -20,8 +17,12 @@ struct SeenMedia {
     depth += here;
     const float seen = before - mean(exp(depth * -1));
     weight += static_cast<double>(seen);
-    moment += static_cast<double>(seen * 0.5f * (t0 + t1));
+    moment += static_cast<double>(seen * lerp(t0, t1, meanDistance(mean(here))));
   }
+
+ private:
+  /// Mean of t in [0, 1] by exp(-depth t): 1 / depth - 1 / (exp(depth) - 1).
+  static float meanDistance(float d) { return d > 0.05f ? 1 / d - 1 / std::expm1(d) : 0.5f - d / 12; }
 };
 
 /// A colour by which the surface's light may be divided; of bsdfs other than diffuse ones nothing is known.
@@ -44,7 +45,7 @@ PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
   f.depth = hit.found() ? hit.t : kInfinity;
   SeenMedia seen;
   walkMedia(view, rays, r, hit.found() ? hit.t : camera.tMax, [&](float t0, float t1) {
-    return marchMedia(view, r.media, r.ray, t0, t1, kSteps, 0, [&](float a, float b, Rgb depth) {
+    return marchMedia(view, r.media, r.ray, t0, t1, MarchedEye::kSteps, 0, [&](float a, float b, Rgb depth) {
       seen.add(a, b, depth);
       return true;
     });

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/instant_scattering/frame.h"
+
+#include "core/parallel.h"
+
+namespace virga {
+namespace {
+
+/// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
+constexpr int kGroup = 32;
+
+/// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same ones in each frame.
+Upsampling::Light sampled(const ImsPixels& pixels, Upsampling::Pixel p, SampleId id, int samples) {
+  Upsampling::Light light;
+  const float share = 1 / static_cast<float>(samples);
+  for (int s = 0; s < samples; ++s) {
+    id.index = static_cast<uint32_t>(s);
+    const LayerRadiance r = pixels.sample(p.x, p.y, id);
+    light.surface[0] += r.value[static_cast<int>(Layer::surfaceToSurface)] * share;
+    light.surface[1] += r.value[static_cast<int>(Layer::mediaToSurface)] * share;
+    light.media[0] += r.value[static_cast<int>(Layer::surfaceToMedia)] * share;
+    light.media[1] += r.value[static_cast<int>(Layer::mediaToMedia)] * share;
+  }
+  return light;
+}
+
+}  // namespace
+
+void FrameRenderer::forget(const ChangeSet& changes) {
+  upsampling_ = nullptr;
+  const std::vector<Change>& all = changes.changes;
+  const bool cameraAlone =
+      std::all_of(all.begin(), all.end(), [](const Change& change) { return change.aspect == Aspect::camera; });
+  if (!cameraAlone) lights_ = nullptr;
+}
+
+bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
+                                  const std::stop_token& stop) {
+  const int around = endlessMedium(scene);
+  if (lights_ && lightsOf_ == index && around == around_) return true;
+  lights_ = nullptr;
+  const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
+  VirtualLights traced = traceVirtualLights(scene, {options.walks, maxDepth}, {seed, 0, 0, index}, stop);
+  auto lights = std::make_unique<FrameLights>(scene, std::move(traced), stop);
+  if (stop.stop_requested()) return false;
+  lights_ = std::move(lights);
+  lightsOf_ = index, around_ = around;
+  return true;
+}
+
+bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
+                         const std::stop_token& stop, PassFrame& frame) {
+  if (!prepareLights(scene, options, seed, index, stop)) return false;
+  if (!upsampling_) {
+    std::vector<PixelFeatures> features = pictureFeatures(scene, stop);
+    if (stop.stop_requested()) return false;
+    upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
+  }
+  const FramePixels pixels(scene, *lights_, options, index);
+  const ImsPixels paths(scene, lights_->virtualLights(), options);
+  const std::vector<Upsampling::Pixel>& computed = upsampling_->computed();
+  std::vector<Upsampling::Light> light(computed.size());
+  const auto idOf = [&](int x, int y) { return SampleId{seed, 0, scene.camera.pixelStream(x, y), index}; };
+
+  const auto groups = (static_cast<int64_t>(computed.size()) + kGroup - 1) / kGroup;
+  parallelFor(groups, 1, [&](int64_t n) {
+    if (stop.stop_requested()) return;
+    const size_t first = static_cast<size_t>(n) * kGroup, count = std::min<size_t>(kGroup, computed.size() - first);
+    const auto found = pixels.indirect({&computed[first], count});
+    for (size_t i = 0; i < count; ++i) {
+      const Upsampling::Pixel p = computed[first + i];
+      light[first + i] = found[i] ? Upsampling::Light{found[i]->surface, found[i]->media}
+                                  : sampled(paths, p, idOf(p.x, p.y), options.samples);
+    }
+  });
+  forEachPixel(frame, stop, [&](int x, int y) {
+    LayerRadiance radiance;
+    if (!pixels.direct(x, y, radiance)) radiance = paths.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+    const Upsampling::Light found = upsampling_->at(light, x, y);
+    radiance.add(Layer::surfaceToSurface, found.surface[0]);
+    radiance.add(Layer::mediaToSurface, found.surface[1]);
+    radiance.add(Layer::surfaceToMedia, found.media[0]);
+    radiance.add(Layer::mediaToMedia, found.media[1]);
+    frame.set(x, y, radiance);
+  });
+  return !stop.stop_requested();
+}
+
+}  // namespace virga

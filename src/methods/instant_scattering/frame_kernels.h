@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+#include "core/host_device.h"
+
+namespace virga {
+
+// What a frame (`ims.mode=frame`) spends its time on: every virtual light lights every receiver. Plain loops over arrays;
+// the functions at the end run them. They are compiled with -ffast-math, all of this has internal linkage, and nothing
+// here may meet a NaN.
+
+/// A virtual light: Lambertian on a surface, or in a medium.
+struct KernelLight {
+  float px, py, pz;
+  float ax, ay, az;  ///< on a surface its normal; in a medium toward where the light came from
+  float r, g, b;     ///< LightVertex::weight over the number of walks [W]
+  float anisotropy;  ///< g of Henyey and Greenstein's phase function; 0 on surfaces
+};
+
+/// Points that are lit, of one kind. Arrays of `count`.
+struct KernelReceivers {
+  int count = 0;
+  const float *px, *py, *pz;
+  const float *ax, *ay, *az;  ///< on a surface its shading normal; in a medium toward where the eye path came from
+  const float* anisotropy;    ///< g, in a medium
+  float *r, *g, *b;           ///< light is added here: over bsdf or albedo [1/unit^2 W]
+};
+
+/// How the ends of a connection scatter.
+enum class EndKind { lambertian, isotropic, henyeyGreenstein };
+
+/// The geometry term near a light.
+struct NearField {
+  enum class Kind {
+    clamped,  ///< min(G, bound)
+    spread    ///< the light is spread over a ball of 1 / sqrt(bound), its energy kept
+  };
+  Kind kind = Kind::clamped;
+  float bound = 1;  ///< [1/unit^2]
+};
+
+/// Optical depths around a point: directions at the nodes of an octahedral map, and along each of them distances that
+/// grow as squares, so that they are densest near the point.
+struct DepthTable {
+  static constexpr int kSide = 12;   ///< nodes along the map's edge; those on its border are there twice
+  static constexpr int kRadii = 24;  ///< the first at 0
+  static constexpr int kSize = kSide * kSide * kRadii;
+
+  const float* depth;  ///< [row][column][radius]
+  float reach;         ///< [unit] distance of the last radius: there is nothing beyond
+};
+
+namespace kernels {
+
+constexpr float kInverse4Pi = 0.07957747154594767f;
+
+/// Cosine and scattering of an end, `c` the cosine between its axis and the way to the other end.
+template <EndKind kind>
+VIRGA_HD static inline float endCosine(float c) {
+  return kind == EndKind::lambertian ? (c > 0 ? c : 0.f) : 1.f;
+}
+template <EndKind kind>
+VIRGA_HD static inline float endScattering(float c, float g) {
+  if (kind == EndKind::lambertian) return 1;
+  if (kind == EndKind::isotropic) return kInverse4Pi;
+  const float d = 1 + g * g + 2 * g * c;
+  return kInverse4Pi * (1 - g * g) / (d * std::sqrt(d));
+}
+
+/// What takes the place of 1 / d^2 within the radius 1 / sqrt(bound) of a light that is spread: with s = d^2 bound a
+/// polynomial that meets 1 / d^2 at s = 1 with the same slope, and whose integral over the ball is that of 1 / d^2.
+VIRGA_HD static inline float spreadFalloff(float d2, float bound) {
+  const float s = d2 * bound;
+  return s < 1 ? bound * (9 + s * (7 * s - 15)) : 1 / d2;
+}
+
+/// One light, all receivers. `seen`: transmittance times visibility from the light to each of them, per channel.
+template <EndKind light, EndKind receiver, NearField::Kind near>
+VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const float* seenR,
+                                   const float* seenG, const float* seenB, float bound) {
+  const float* __restrict px = to.px;
+  const float* __restrict py = to.py;
+  const float* __restrict pz = to.pz;
+  float* __restrict r = to.r;
+  float* __restrict g = to.g;
+  float* __restrict b = to.b;
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i];
+    const float d2 = x * x + y * y + z * z + 1e-20f;
+    const float inverse = 1 / std::sqrt(d2);
+    const float cl = -(l.ax * x + l.ay * y + l.az * z) * inverse;
+    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
+    const float cosines = endCosine<light>(cl) * endCosine<receiver>(cr);
+    const float term = near == NearField::Kind::clamped ? std::fmin(cosines * (inverse * inverse), bound)
+                                                        : cosines * spreadFalloff(d2, bound);
+    const float value = term * endScattering<light>(cl, l.anisotropy) *
+                        endScattering<receiver>(cr, receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0);
+    r[i] += value * l.r * seenR[i];
+    g[i] += value * l.g * seenG[i];
+    b[i] += value * l.b * seenB[i];
+  }
+}
+
+/// Transmittance from a light through a homogeneous medium that is everywhere.
+VIRGA_HD static inline void seenThroughFog(const KernelLight& l, const KernelReceivers& to, float sigmaT, float* seen) {
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = l.px - to.px[i], y = l.py - to.py[i], z = l.pz - to.pz[i];
+    seen[i] = std::exp(-sigmaT * std::sqrt(x * x + y * y + z * z));
+  }
+}
+
+/// Where a direction lies on an octahedral map, in [-1, 1]^2 (Engelhardt and Dachsbacher 2008).
+VIRGA_HD static inline void octahedral(float x, float y, float z, float& u, float& v) {
+  const float inverse = 1 / (std::fabs(x) + std::fabs(y) + std::fabs(z));
+  const float a = x * inverse, b = y * inverse;
+  const float foldedA = std::copysign(1 - std::fabs(b), a), foldedB = std::copysign(1 - std::fabs(a), b);
+  u = z >= 0 ? a : foldedA;
+  v = z >= 0 ? b : foldedB;
+}
+
+/// Multiplies `seen` by the transmittance that a light's table knows.
+VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
+                                             float* seen) {
+  constexpr int kSide = DepthTable::kSide, kRadii = DepthTable::kRadii;
+  const float* __restrict depth = table.depth;
+  const float scale = (kRadii - 1) * (kRadii - 1) / table.reach;
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
+    float u, v;
+    octahedral(x, y, z, u, v);
+    u = (u + 1) * (0.5f * (kSide - 1)), v = (v + 1) * (0.5f * (kSide - 1));
+    const float m = std::fmin(std::sqrt(std::sqrt(x * x + y * y + z * z) * scale), kRadii - 1.001f);
+    const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)), row = static_cast<int>(std::fmin(v, kSide - 1.001f)),
+              radius = static_cast<int>(m);
+    const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row), fm = m - static_cast<float>(radius);
+    const int at = (row * kSide + column) * kRadii + radius;
+    const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
+    const float d01 = depth[at + kRadii] * (1 - fm) + depth[at + kRadii + 1] * fm;
+    const float d10 = depth[at + kRadii * kSide] * (1 - fm) + depth[at + kRadii * kSide + 1] * fm;
+    const float d11 = depth[at + kRadii * (kSide + 1)] * (1 - fm) + depth[at + kRadii * (kSide + 1) + 1] * fm;
+    seen[i] *= std::exp(-((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv));
+  }
+}
+
+}  // namespace kernels
+
+// --- to be called; defined in frame_kernels.cpp ---
+
+/// Adds the light of `light` to all receivers, seen by `seen[channel]`, arrays of `to.count` transmittances.
+void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                 const float* const seen[3], const NearField& near);
+/// exp(-sigmaT d) for each receiver.
+void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen);
+/// Multiplies `seen` by what the light's table says.
+void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen);
+
+}  // namespace virga
