@@ -5,6 +5,9 @@
 
 namespace virga {
 
+/// Steps whose densities are looked up together.
+inline constexpr int kMarchedAtOnce = 65;
+
 /// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
 /// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
 /// returns false. Homogeneous media are exact, and a single step.
@@ -29,9 +32,24 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   end = std::min(end, begin + 40 / thickest);
   if (homogeneous) steps = 1, shift = 0;
   const float step = (end - begin) / static_cast<float>(steps);
+  const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
+  const MediumView& first = scene.media[media.medium(0)];
+  if (media.count() == 1 && first.isPlainGrid()) {
+    float density[kMarchedAtOnce];
+    for (int n0 = 0; n0 <= steps; n0 += kMarchedAtOnce) {
+      const int count = std::min(kMarchedAtOnce, steps + 1 - n0);
+      // The first step and the last may be cut: their middles are off by less than half a step.
+      const GridRay inGrid(first, {ray.at(begin + step * (static_cast<float>(n0) + 0.5f - shift)), ray.d * step});
+      lookupAlong(first.density, inGrid.o, inGrid.d, count, density);
+      for (int n = 0; n < count; ++n) {
+        const float a = border(n0 + n), b = std::min(end, border(n0 + n + 1));
+        if (a < b && !visit(a, b, first.spectrum * (first.sigmaT * density[n] * (b - a)))) return false;
+      }
+    }
+    return true;
+  }
   for (int n = 0; n <= steps; ++n) {
-    const float a = begin + step * std::max(0.f, static_cast<float>(n) - shift);
-    const float b = std::min(end, begin + step * (static_cast<float>(n + 1) - shift));
+    const float a = border(n), b = std::min(end, border(n + 1));
     if (!(a < b)) continue;
     const Vec3 p = ray.at(0.5f * (a + b));
     Rgb sigmaT;
@@ -80,6 +98,8 @@ struct MarchedEye {
   Side side;
   Bsdf textured;
 
+  bool broad = true;  ///< no mirror, glass or narrow bsdf is met
+
   VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
 
   /// Points in equal parts of what is seen of the media, each of them at `shift` in [0, 1) of its part:
@@ -103,17 +123,16 @@ struct MarchedEye {
   }
 };
 
-/// Fills `eye`, steps shifted by `shift`. False where the ray meets a mirror, glass or a narrow bsdf first: then the
-/// media have not been looked at.
+/// Fills `eye`, steps shifted by `shift`.
 template <class Rays>
-VIRGA_HD bool marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
                        MarchedEye& eye) {
   eye.at = leaveCamera(scene, camera.ray);
   eye.hit = rays.nearest(eye.at.ray, camera.tMax);
   if (eye.hit.found()) {
     eye.point = surfacePoint(scene.surfaces[eye.hit.shape], eye.at.ray, eye.hit, scene.scale);
     eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
-    if (!eye.side.bsdf->broad()) return false;
+    eye.broad = eye.side.bsdf->broad();
   }
   walkMedia(scene, rays, eye.at, eye.hit.found() ? eye.hit.t : camera.tMax, [&](float t0, float t1) {
     if (eye.at.media.vacuum()) return true;
@@ -132,7 +151,6 @@ VIRGA_HD bool marchEye(const SceneView& scene, const Rays& rays, const CameraRay
     eye.stretches += kept ? 1 : 0;
     return true;
   });
-  return true;
 }
 
 }  // namespace virga

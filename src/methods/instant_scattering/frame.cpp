@@ -9,6 +9,10 @@ namespace {
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
 constexpr int kGroup = 32;
 
+/// The layers that are not upsampled: those before the others.
+constexpr int kDirectLayers = static_cast<int>(Layer::surfaceToSurface);
+using DirectLight = std::array<Rgb, kDirectLayers>;
+
 /// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same ones in each frame.
 Upsampling::Light sampled(const ImsPixels& pixels, Upsampling::Pixel p, SampleId id, int samples) {
   Upsampling::Light light;
@@ -27,7 +31,6 @@ Upsampling::Light sampled(const ImsPixels& pixels, Upsampling::Pixel p, SampleId
 }  // namespace
 
 void FrameRenderer::forget(const ChangeSet& changes) {
-  upsampling_ = nullptr;
   const std::vector<Change>& all = changes.changes;
   const bool cameraAlone =
       std::all_of(all.begin(), all.end(), [](const Change& change) { return change.aspect == Aspect::camera; });
@@ -51,16 +54,27 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
 bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
                          const std::stop_token& stop, PassFrame& frame) {
   if (!prepareLights(scene, options, seed, index, stop)) return false;
-  if (!upsampling_) {
-    std::vector<PixelFeatures> features = pictureFeatures(scene, stop);
-    if (stop.stop_requested()) return false;
-    upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
-  }
   const FramePixels pixels(scene, *lights_, options, index);
   const ImsPixels paths(scene, lights_->virtualLights(), options);
-  const std::vector<Upsampling::Pixel>& computed = upsampling_->computed();
-  std::vector<Upsampling::Light> light(computed.size());
   const auto idOf = [&](int x, int y) { return SampleId{seed, 0, scene.camera.pixelStream(x, y), index}; };
+  const auto numberOf = [&](int x, int y) {
+    return static_cast<size_t>(y) * static_cast<size_t>(frame.width()) + static_cast<size_t>(x);
+  };
+
+  const size_t all = numberOf(0, frame.height());
+  std::vector<PixelFeatures> features(all);
+  std::vector<DirectLight> direct(all);
+  forEachPixel(frame, stop, [&](int x, int y) {
+    LayerRadiance radiance;
+    if (!pixels.direct(x, y, features[numberOf(x, y)], radiance))
+      radiance = paths.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+    std::copy_n(radiance.value, kDirectLayers, direct[numberOf(x, y)].begin());
+  });
+  if (stop.stop_requested()) return false;
+  const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options.spacing);
+
+  const std::vector<Upsampling::Pixel>& computed = upsampling.computed();
+  std::vector<Upsampling::Light> light(computed.size());
 
   const auto groups = (static_cast<int64_t>(computed.size()) + kGroup - 1) / kGroup;
   parallelFor(groups, 1, [&](int64_t n) {
@@ -75,8 +89,8 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
   });
   forEachPixel(frame, stop, [&](int x, int y) {
     LayerRadiance radiance;
-    if (!pixels.direct(x, y, radiance)) radiance = paths.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
-    const Upsampling::Light found = upsampling_->at(light, x, y);
+    std::copy_n(direct[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
+    const Upsampling::Light found = upsampling.at(light, x, y);
     radiance.add(Layer::surfaceToSurface, found.surface[0]);
     radiance.add(Layer::mediaToSurface, found.surface[1]);
     radiance.add(Layer::surfaceToMedia, found.media[0]);

@@ -31,7 +31,6 @@ class FrameRenderer {
   std::unique_ptr<FrameLights> lights_;
   uint32_t lightsOf_ = 0;  ///< the pass that they belong to
   int around_ = 0;         ///< the medium that had no end when they were made
-  std::unique_ptr<Upsampling> upsampling_;
 };
 
 }  // namespace virga

@@ -8,8 +8,12 @@ CameraRay FramePixels::cameraRay(int x, int y) const {
   return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
 }
 
-bool FramePixels::direct(int x, int y, LayerRadiance& radiance) const {
-  return marched_.add(cameraRay(x, y), radiance, numbers_);
+bool FramePixels::direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const {
+  MarchedEye eye;
+  marchEye(scene_.view, rays_, cameraRay(x, y), numbers_.shift(), eye);
+  features = pixelFeatures(eye);
+  if (eye.broad) marched_.add(eye, radiance, numbers_);
+  return eye.broad;
 }
 
 template <class Visit>
@@ -35,7 +39,8 @@ std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<co
   std::vector<std::optional<Upsampling::Light>> light(pixels.size());
   for (size_t n = 0; n < pixels.size(); ++n) {
     MarchedEye eye;
-    if (!marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye)) continue;
+    marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye);
+    if (!eye.broad) continue;
     light[n].emplace();
     visitReceivers(eye, [&](Receiver r) {
       r.pixel = static_cast<int>(n);

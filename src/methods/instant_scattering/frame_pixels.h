@@ -27,8 +27,9 @@ class FramePixels {
 
   using Pixel = Upsampling::Pixel;
 
-  /// Light of x1 straight from lamps. False, and nothing added, where a mirror, glass or a narrow bsdf is seen.
-  bool direct(int x, int y, LayerRadiance& radiance) const;
+  /// What is seen, and light of x1 straight from lamps. False, and no light added, where a mirror, glass or a narrow
+  /// bsdf is seen.
+  bool direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const;
 
   /// Light that the virtual lights send by way of each pixel's x1; nothing where direct() is false.
   std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;

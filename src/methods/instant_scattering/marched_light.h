@@ -66,11 +66,11 @@ class MarchedLight {
   template <class Numbers>
   VIRGA_HD bool add(const CameraRay& camera, LayerRadiance& radiance, Numbers numbers) const {
     MarchedEye eye;
-    if (!marchEye(scene_, rays_, camera, numbers.shift(), eye)) return false;
-    add(eye, radiance, numbers);
-    return true;
+    marchEye(scene_, rays_, camera, numbers.shift(), eye);
+    if (eye.broad) add(eye, radiance, numbers);
+    return eye.broad;
   }
-  /// Of an eye ray that has been marched already.
+  /// Of an eye ray that has been marched already and is broad.
   template <class Numbers>
   VIRGA_HD void add(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     lightMedia(eye, radiance, numbers);

@@ -15,7 +15,7 @@ constexpr float kLeastAgreement = 0.02f;
 /// What is seen by less than this share needs no care.
 constexpr float kFaint = 2e-3f;
 
-float bell(float x) { return std::exp(-0.5f * x * x); }
+float bell(float x, float y) { return std::exp(-0.5f * (x * x + y * y)); }
 
 /// Cubic B-spline at the four knots around the place t in [0, 1) between the middle two.
 std::array<float, 4> spline(float t) {
@@ -27,14 +27,14 @@ float surfacesAgree(const PixelFeatures& a, const PixelFeatures& b) {
   if (std::isinf(a.depth) || std::isinf(b.depth)) return 0;
   const Vec3 way = b.p - a.p;
   const float off = std::max(std::fabs(dot(way, a.normal)), std::fabs(dot(way, b.normal)));
-  return bell(off / (kDepthWidth * std::min(a.depth, b.depth))) * bell((1 - dot(a.normal, b.normal)) / kNormalWidth);
+  return bell(off / (kDepthWidth * std::min(a.depth, b.depth)), (1 - dot(a.normal, b.normal)) / kNormalWidth);
 }
 
 float mediaAgree(const PixelFeatures& a, const PixelFeatures& b) {
   const float least = std::min(a.mediaDepth, b.mediaDepth);
   if (!(least > 0)) return 0;
-  return bell((a.mediaDepth - b.mediaDepth) / (kMediaDepthWidth * least)) *
-         bell((mean(a.opacity) - mean(b.opacity)) / kOpacityWidth);
+  return bell((a.mediaDepth - b.mediaDepth) / (kMediaDepthWidth * least),
+              (mean(a.opacity) - mean(b.opacity)) / kOpacityWidth);
 }
 
 /// Sum of weight * light over the sum of weight * veil, seen through the pixel's own veil.
