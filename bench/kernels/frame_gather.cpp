@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "methods/instant_scattering/frame_kernels.h"
 #include "volume/grid.h"
+#include "volume/lookup_along.h"
 #include "volume/procedural.h"
 
 namespace virga {
@@ -104,10 +105,12 @@ template <bool together>
 void gridSamples(benchmark::State& state) {
   const Plume plume;
   const GridView grid = plume.grid->view();
-  Pcg32 random(3);
+  int pixel = 0;
   float out[64];
   for (auto _ : state) {
-    const Vec3 o(random.next() * 128, random.next() * 128, 0), d(random.next() - 0.5f, random.next() - 0.5f, 2);
+    // Ray after ray as in a picture of 256 x 256, obliquely across the grid.
+    const Vec3 o(static_cast<float>(pixel % 256) * 0.4f, static_cast<float>(pixel / 256) * 0.4f, 0), d(0.3f, 0.2f, 1.9f);
+    pixel = (pixel + 1) % (256 * 256);
     if (together)
       lookupAlong(grid, o, d, 64, out);
     else

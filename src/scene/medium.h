@@ -33,10 +33,6 @@ struct MediumView {
   RgbGridView emissionColors;  ///< as densityColors
   Affine worldToEmission;      ///< world to index coordinates of the emission
 
-  /// Its density is a dense grid of scalars, and nothing around that.
-  VIRGA_HD bool isPlainGrid() const {
-    return !homogeneous && density.kind == GridView::Kind::dense && !(density.background > 0) && !densityColors.values;
-  }
   VIRGA_HD Rgb sigmaTAt(Vec3 p) const {
     if (homogeneous) return spectrum * sigmaT;
     const Vec3 q = worldToDensity.point(p);

@@ -119,33 +119,4 @@ struct GridView {
   }
 };
 
-/// out[n]: the value of a dense grid without background at o + n d, index coordinates. A plain loop that compilers make
-/// vector code of.
-VIRGA_HD inline void lookupAlong(const GridView& grid, Vec3 o, Vec3 d, int count, float* out) {
-  const DenseGridView& box = grid.dense;
-  const float* values = box.values;
-  const Vec3 start = o - grid.denseOrigin, lo = grid.supportLo - grid.denseOrigin, hi = grid.supportHi - grid.denseOrigin;
-  const float mostX = static_cast<float>(box.nx - 1), mostY = static_cast<float>(box.ny - 1),
-              mostZ = static_cast<float>(box.nz - 1);
-  const int row = box.nx, slice = box.nx * box.ny;
-#pragma omp simd
-  for (int n = 0; n < count; ++n) {
-    const auto t = static_cast<float>(n);
-    const float px = start.x + t * d.x, py = start.y + t * d.y, pz = start.z + t * d.z;
-    const bool inside = px >= lo.x && py >= lo.y && pz >= lo.z && px <= hi.x && py <= hi.y && pz <= hi.z;
-    const float x = px < 0 ? 0 : (px > mostX ? mostX : px), y = py < 0 ? 0 : (py > mostY ? mostY : py),
-                z = pz < 0 ? 0 : (pz > mostZ ? mostZ : pz);
-    const int i = static_cast<int>(x), j = static_cast<int>(y), k = static_cast<int>(z);
-    const float fx = x - static_cast<float>(i), fy = y - static_cast<float>(j), fz = z - static_cast<float>(k);
-    const int dx = i + 1 < box.nx ? 1 : 0, dy = j + 1 < box.ny ? row : 0, dz = k + 1 < box.nz ? slice : 0;
-    const int v = k * slice + j * row + i;
-    const float c00 = values[v] + (values[v + dx] - values[v]) * fx;
-    const float c10 = values[v + dy] + (values[v + dy + dx] - values[v + dy]) * fx;
-    const float c01 = values[v + dz] + (values[v + dz + dx] - values[v + dz]) * fx;
-    const float c11 = values[v + dz + dy] + (values[v + dz + dy + dx] - values[v + dz + dy]) * fx;
-    const float c0 = c00 + (c10 - c00) * fy, c1 = c01 + (c11 - c01) * fy;
-    out[n] = inside ? c0 + (c1 - c0) * fz : 0;
-  }
-}
-
 }  // namespace virga

@@ -2,8 +2,16 @@
 #pragma once
 
 #include "transport/visibility.h"
+#include "volume/lookup_along.h"
 
 namespace virga {
+
+/// The medium's density is a dense grid of scalars with nothing around it, small enough for lookupAlong().
+VIRGA_HD inline bool isPlainGrid(const MediumView& medium) {
+  const GridView& grid = medium.density;
+  if (medium.homogeneous || grid.kind != GridView::Kind::dense || grid.background > 0) return false;
+  return !medium.densityColors.values && double{1} * grid.dense.nx * grid.dense.ny * grid.dense.nz < 2147483648.0;
+}
 
 /// Steps whose densities are looked up together.
 inline constexpr int kMarchedAtOnce = 65;
@@ -34,7 +42,7 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   const float step = (end - begin) / static_cast<float>(steps);
   const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
   const MediumView& first = scene.media[media.medium(0)];
-  if (media.count() == 1 && first.isPlainGrid()) {
+  if (media.count() == 1 && isPlainGrid(first)) {
     float density[kMarchedAtOnce];
     for (int n0 = 0; n0 <= steps; n0 += kMarchedAtOnce) {
       const int count = std::min(kMarchedAtOnce, steps + 1 - n0);

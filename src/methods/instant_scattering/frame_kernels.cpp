@@ -44,6 +44,10 @@ void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float s
   kernels::seenThroughFog(light, to, sigmaT, seen);
 }
 
+void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b) {
+  kernels::lightFog(lamps, ray, shift, t, r, g, b);
+}
+
 void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen) {
   kernels::seenThroughTable(light, to, table, seen);
 }

@@ -21,7 +21,8 @@ class FramePixels {
         lights_(lights),
         options_(options),
         numbers_{pass},
-        marched_(scene_.view, rays_) {}
+        lamps_(fogLamps(scene.view, numbers_)),
+        marched_(scene_.view, rays_, &lamps_) {}
   FramePixels(const FramePixels&) = delete;
   FramePixels& operator=(const FramePixels&) = delete;
 
@@ -45,6 +46,7 @@ class FramePixels {
   const FrameLights& lights_;
   const ImsOptions& options_;
   FixedNumbers numbers_;
+  FogLamps lamps_;
   MarchedLight<EmbreeRays> marched_;  ///< refers to the members above
 };
 

@@ -3,7 +3,7 @@
 
 #include "core/sampler.h"
 #include "methods/instant_scattering/eye_march.h"
-#include "transport/equiangular.h"
+#include "methods/instant_scattering/frame_kernels.h"
 
 namespace virga {
 
@@ -11,7 +11,6 @@ namespace virga {
 struct RandomNumbers {
   static constexpr int kPoints = 4;           ///< on the eye ray that are lit
   static constexpr int kSurfaceLamps = 1;     ///< points on lamps that light the surface
-  static constexpr bool kEquiangular = false; ///< points in fog by angle as seen from a lamp
 
   Sampler& sampler;
 
@@ -30,9 +29,8 @@ struct RandomNumbers {
 /// The same in every pixel (`frame`): points of an even set, turned by a number of the pass. Nothing shimmers; what an
 /// even set gets wrong changes slowly from pixel to pixel.
 struct FixedNumbers {
-  static constexpr int kPoints = 8;
+  static constexpr int kPoints = FogLamps::kCount;
   static constexpr int kSurfaceLamps = 4;
-  static constexpr bool kEquiangular = true;
 
   uint32_t pass;
 
@@ -53,6 +51,18 @@ struct FixedNumbers {
   }
 };
 
+struct LampChoice {
+  int index;
+  float probability;  ///< 0: there is none
+};
+/// By power.
+VIRGA_HD inline LampChoice chooseLamp(const SceneView& scene, float u) {
+  const int count = scene.emitters.size;
+  if (count == 0 || !(scene.emitterChoice.cdf[count] > 0)) return {0, 0};
+  const auto choice = scene.emitterChoice.sample(u);
+  return {choice.index, choice.probability};
+}
+
 /// Light of the lamps at the first vertex of an eye ray, surface and medium both in every sample, by marching. Its bias
 /// is that of the steps: it vanishes with them. `Numbers`: RandomNumbers or FixedNumbers.
 template <class Rays>
@@ -60,7 +70,9 @@ class MarchedLight {
  public:
   static constexpr int kLightSteps = 24;  ///< toward a lamp
 
-  VIRGA_HD MarchedLight(const SceneView& scene, const Rays& rays) : scene_(scene), rays_(rays) {}
+  /// `lamps`: points in fog are lit by these, wherever they are known; null: by none.
+  VIRGA_HD MarchedLight(const SceneView& scene, const Rays& rays, const FogLamps* lamps = nullptr)
+      : scene_(scene), rays_(rays), lamps_(lamps) {}
 
   /// False, and nothing added, where the ray meets a mirror, glass or a narrow bsdf first.
   template <class Numbers>
@@ -87,15 +99,15 @@ class MarchedLight {
   VIRGA_HD void lightMedia(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     const float shift = numbers.shift();
     const float share = 1.f / Numbers::kPoints;
-    const bool inFog = Numbers::kEquiangular && isFog(eye);
+    const bool inFog = lamps_ && isFog(eye);
+    if (inFog) lightFogOf(eye, shift, radiance, numbers);
     eye.visitPoints(Numbers::kPoints, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
+      if (inFog && lamps_->known[k]) return;
       const auto drawn = numbers.lamp(k, Numbers::kPoints);
-      const Choice lamp = chooseLamp(drawn.choice);
+      const LampChoice lamp = chooseLamp(scene_, drawn.choice);
       if (!(lamp.probability > 0)) return;
-      const EmitterView& emitter = scene_.emitters[lamp.index];
-      const Rgb found = inFog && emitter.isLocal()
-                            ? fogLight(eye, emitter, drawn.u, (static_cast<float>(k) + shift) * share, numbers)
-                            : weight * lampAt(p, -eye.at.ray.d, media, sampleLight(scene_, emitter, p, drawn.u), numbers);
+      const LightSample light = sampleLight(scene_, scene_.emitters[lamp.index], p, drawn.u);
+      const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, light, numbers);
       radiance.add(Layer::directMedia, found * (share / lamp.probability));
     });
   }
@@ -115,25 +127,34 @@ class MarchedLight {
     return scattered * light.radiance * (lampSeen({{p, light.wi}, media, 0}, p, light, numbers) / light.pdf);
   }
 
-  /// The ray passes a single stretch of a single homogeneous medium.
+  /// The ray passes a single stretch of a single homogeneous medium whose phase function is plain.
   VIRGA_HD bool isFog(const MarchedEye& eye) const {
-    return eye.stretches == 1 && eye.steps == 1 && eye.media[0].count() == 1 &&
-           scene_.media[eye.media[0].medium(0)].homogeneous;
+    if (eye.stretches != 1 || eye.steps != 1 || eye.media[0].count() != 1) return false;
+    const MediumView& medium = scene_.media[eye.media[0].medium(0)];
+    return medium.homogeneous && !medium.albedoGrid.values && medium.phaseBlends.size == 0 &&
+           (medium.phase.get<Isotropic>() || medium.phase.get<HenyeyGreenstein>());
   }
-  /// Of one lamp at a finite distance, by a point at the share u of the angle that the fog fills as seen from it.
   template <class Numbers>
-  VIRGA_HD Rgb fogLight(const MarchedEye& eye, const EmitterView& emitter, Vec2 place, float u, Numbers& numbers) const {
-    const int index = eye.media[0].medium(0);
-    const MediumView& medium = scene_.media[index];
+  VIRGA_HD void lightFogOf(const MarchedEye& eye, float shift, LayerRadiance& radiance, Numbers& numbers) const {
+    const MediumView& medium = scene_.media[eye.media[0].medium(0)];
     const Ray& ray = eye.at.ray;
-    const EquiangularSegment segment{index, true, ray, eye.step[0].t0, eye.step[0].t1, medium.sigmaT, medium.grey,
-                                     medium.spectrum};
-    const LightPoint on = sampleLightPoint(scene_, emitter, place);
-    const auto distance = segment.sample(on.p, u);
-    if (!(distance.pdf > 0)) return {};
-    const Vec3 p = ray.at(distance.t);
-    return segment.flight(distance.t) * lampAt(p, -ray.d, eye.media[0], towardPoint(emitter, p, on), numbers) /
-           distance.pdf;
+    const Rgb sigmaT = medium.spectrum * medium.sigmaT;
+    const auto* hg = medium.phase.get<HenyeyGreenstein>();
+    const FogRay fog{ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z, eye.step[0].t0, eye.step[0].t1,
+                     {sigmaT.r, sigmaT.g, sigmaT.b}, hg ? hg->g : 0};
+    float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
+    lightFog(*lamps_, fog, shift, t, r, g, b);
+    for (int k = 0; k < FogLamps::kCount; ++k) {
+      const Rgb found(r[k], g[k], b[k]);
+      if (!lamps_->known[k] || isBlack(found)) continue;
+      const Vec3 p = ray.at(t[k]), way = Vec3(lamps_->px[k], lamps_->py[k], lamps_->pz[k]) - p;
+      LightSample light;
+      light.distance = length(way);
+      if (!(light.distance > 0)) continue;
+      light.wi = way / light.distance;
+      radiance.add(Layer::directMedia,
+                   found * medium.albedo * lampSeen({{p, light.wi}, eye.media[0], 0}, p, light, numbers));
+    }
   }
 
   template <class Numbers>
@@ -150,7 +171,7 @@ class MarchedLight {
     const int count = allAlike ? 1 : Numbers::kSurfaceLamps;
     for (int k = 0; k < count; ++k) {
       const auto drawn = numbers.lamp(k, count);
-      const Choice lamp = chooseLamp(drawn.choice);
+      const LampChoice lamp = chooseLamp(scene_, drawn.choice);
       if (!(lamp.probability > 0)) return;
       const LightSample light = sampleLight(scene_, scene_.emitters[lamp.index], point.p, drawn.u);
       if (!(light.pdf > 0)) continue;
@@ -163,17 +184,6 @@ class MarchedLight {
     }
   }
 
-  struct Choice {
-    int index;
-    float probability;
-  };
-  /// By power.
-  VIRGA_HD Choice chooseLamp(float u) const {
-    const int count = scene_.emitters.size;
-    if (count == 0 || !(scene_.emitterChoice.cdf[count] > 0)) return {0, 0};
-    const auto choice = scene_.emitterChoice.sample(u);
-    return {choice.index, choice.probability};
-  }
   template <class Numbers>
   VIRGA_HD Rgb lampSeen(const MediaRay& r, Vec3 x, const LightSample& light, Numbers& numbers) const {
     ConnectingRay ray{r, kInfinity};
@@ -185,6 +195,29 @@ class MarchedLight {
 
   const SceneView& scene_;
   const Rays& rays_;
+  const FogLamps* lamps_;
 };
+
+/// The points on lamps that `numbers` choose, as far as they are at a finite distance and send as kernels know it.
+inline FogLamps fogLamps(const SceneView& scene, const FixedNumbers& numbers) {
+  FogLamps lamps;
+  for (int k = 0; k < FogLamps::kCount; ++k) {
+    const auto drawn = numbers.lamp(k, FogLamps::kCount);
+    const LampChoice lamp = chooseLamp(scene, drawn.choice);
+    if (!(lamp.probability > 0)) continue;
+    const EmitterView& emitter = scene.emitters[lamp.index];
+    if (emitter.kind != EmitterView::Kind::point && emitter.kind != EmitterView::Kind::area) continue;
+    const LightPoint on = sampleLightPoint(scene, emitter, drawn.u);
+    if (!(on.areaPdf > 0)) continue;
+    const Rgb sent = (on.pointLike ? emitter.value : emitter.radianceAt(on.uv)) /
+                     (on.areaPdf * lamp.probability * static_cast<float>(FogLamps::kCount));
+    lamps.known[k] = true;
+    lamps.px[k] = on.p.x, lamps.py[k] = on.p.y, lamps.pz[k] = on.p.z;
+    lamps.nx[k] = on.normal.x, lamps.ny[k] = on.normal.y, lamps.nz[k] = on.normal.z;
+    lamps.all[k] = on.pointLike ? 1.f : 0.f;
+    lamps.r[k] = sent.r, lamps.g[k] = sent.g, lamps.b[k] = sent.b;
+  }
+  return lamps;
+}
 
 }  // namespace virga
