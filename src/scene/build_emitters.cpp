@@ -198,8 +198,7 @@ void addAreaEmitter(BuildContext& context, const Node& node, int surface, const 
   e.value = radiance.mean;
   e.texture = radiance.texture;
   e.shape = surface;
-  e.triangles = shape.triangleChoice.view();
-  e.area = shape.area;
+  e.area = shape.view.area;
   e.isRectangle = shape.rectangle.has_value();
   if (e.isRectangle) e.rectangle = *shape.rectangle;
   reader.ignore("sampling_weight");

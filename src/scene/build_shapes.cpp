@@ -22,7 +22,8 @@ void measure(BuiltShape& shape) {
   for (const auto& t : shape.mesh.triangles)
     areas.push_back(0.5f * length(cross(p[t[1]] - p[t[0]], p[t[2]] - p[t[0]])));
   shape.triangleChoice = Discrete(areas);
-  shape.area = static_cast<float>(shape.triangleChoice.total());
+  shape.view.triangleChoice = shape.triangleChoice.view();
+  shape.view.area = static_cast<float>(shape.triangleChoice.total());
   for (const Vec3& v : p) shape.bounds.extend(v);
 }
 
@@ -151,7 +152,7 @@ void buildSphere(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   shape.view.radius = radius;
   placeAxes(shape.view, map);
   shape.rays = RayShape::sphere(center, radius);
-  shape.area = 4 * kPi * radius * radius;
+  shape.view.area = 4 * kPi * radius * radius;
   shape.bounds = {center - Vec3(radius), center + Vec3(radius)};
 }
 
@@ -165,7 +166,7 @@ void buildDisk(BuildContext&, PluginReader& reader, Role, BuiltShape& shape) {
   shape.view.radius = radius;
   placeAxes(shape.view, map);
   shape.rays = RayShape::disk(map.translation, shape.view.normal, radius);
-  shape.area = kPi * radius * radius;
+  shape.view.area = kPi * radius * radius;
   shape.openEdges = 1;
   shape.bounds = {map.translation - Vec3(radius), map.translation + Vec3(radius)};
 }
@@ -196,7 +197,7 @@ void buildCylinder(BuildContext&, PluginReader& reader, Role, BuiltShape& shape)
   view.radius = radius;
   view.length = length;
   shape.rays = RayShape::cylinder(view.center, view.normal, radius, length);
-  shape.area = kTwoPi * radius * length;
+  shape.view.area = kTwoPi * radius * length;
   for (const Vec3 end : {view.center, view.center + view.normal * length}) {
     shape.bounds.extend(end - Vec3(radius));
     shape.bounds.extend(end + Vec3(radius));
@@ -247,7 +248,7 @@ std::shared_ptr<const BuiltShape> geometry(BuildContext& context, PluginReader& 
   } else {
     shape->view.orientation = reader.boolean("flip_normals", false) ? -1.f : 1.f;
     build(context, reader, role, *shape);
-    if (!(shape->area > 0)) reader.failHere("the shape has no area");
+    if (!(shape->view.area > 0)) reader.failHere("the shape has no area");
   }
   return context.cached<BuiltShape>(&PartCache::shapes, key, [&] { return shape; });
 }

@@ -85,7 +85,6 @@ struct EmitterView {
   Vec3 direction;                        ///< spot, directional: unit, in which the light travels
   float cutoffAngle = 0, beamWidth = 0;  ///< spot [rad]
   int shape = -1;                        ///< area: index of its surface
-  DiscreteView triangles;                ///< area, mesh: by area
   float area = 0;                        ///< area [unit^2]
   TextureView texture;                   ///< area: radiance over the surface, in place of `value`
   bool isRectangle = false;              ///< area: a rectangle...
@@ -141,30 +140,8 @@ VIRGA_HD inline Vec2 lightUv(const ShapeView& shape, const EmitterView& emitter,
 }
 
 VIRGA_HD inline LightPoint uniformPointOnShape(const ShapeView& shape, const EmitterView& emitter, Vec2 u) {
-  if (shape.kind == ShapeView::Kind::sphere) {
-    const Vec3 n = uniformSphere(u);
-    const Vec3 p = shape.center + n * shape.radius;
-    return {p, n * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
-  }
-  if (shape.kind == ShapeView::Kind::cylinder) {
-    const float phi = kTwoPi * u.x;
-    const Vec3 n = shape.axisX * std::cos(phi) + shape.axisY * std::sin(phi);
-    const Vec3 p = shape.center + shape.normal * (u.y * shape.length) + n * shape.radius;
-    return {p, n * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
-  }
-  if (shape.kind == ShapeView::Kind::disk) {
-    const Vec2 d = uniformDisk(u);
-    const Frame frame(shape.normal);
-    const Vec3 p = shape.center + (frame.s * d.x + frame.t * d.y) * shape.radius;
-    return {p, shape.normal * shape.orientation, 1 / emitter.area, false, lightUv(shape, emitter, p)};
-  }
-  const auto pick = emitter.triangles.sample(u.x);
-  const auto& triangle = shape.triangles[pick.index];
-  const Vec3 a = shape.positions[triangle[0]], b = shape.positions[triangle[1]], c = shape.positions[triangle[2]];
-  const Vec2 uv = uniformTriangle({pick.remapped, u.y});
-  const Vec3 p = a * (1 - uv.x - uv.y) + b * uv.x + c * uv.y;
-  return {p, normalize(cross(b - a, c - a)) * shape.orientation, 1 / emitter.area, false,
-          lightUv(shape, emitter, p, static_cast<uint32_t>(pick.index), uv)};
+  const ShapePoint s = uniformPointOnShape(shape, u);
+  return {s.p, s.normal, 1 / emitter.area, false, lightUv(shape, emitter, s.p, s.primitive, s.barycentric)};
 }
 
 /// 1 - cos of the half angle under which a sphere is seen from distance d > radius, without cancellation.

@@ -22,7 +22,6 @@ struct BuiltShape {
   Bounds bounds;
   TriangleMesh mesh;                       ///< world space; empty for spheres, disks and cylinders
   Discrete triangleChoice;                 ///< by area
-  float area = 0;                          ///< [unit^2]
   size_t openEdges = 0;                    ///< of a shape that a medium fills; more than 0: it does not enclose a space
   std::optional<RectangleView> rectangle;  ///< that the mesh is
 };

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstdint>
 
+#include "core/distribution.h"
 #include "core/vec.h"
+#include "core/warp.h"
 #include "rays/ray_hit.h"
 #include "scene/medium.h"
 
@@ -23,6 +25,8 @@ struct ShapeView {
   float radius = 0, length = 0;
   Vec3 axisX{1, 0, 0}, axisY{0, 1, 0}, axisZ{0, 0, 1};  ///< unit images of the axes: where u and v begin
   float orientation = 1;                                ///< -1: normals are flipped
+  float area = 0;                                       ///< [unit^2]
+  DiscreteView triangleChoice;                          ///< by area
 
   int bsdf = 0;
   int emitter = -1;  ///< index of the area emitter on it
@@ -42,6 +46,37 @@ struct SurfacePoint {
     return p + geometricNormal * (dot(w, geometricNormal) >= 0 ? epsilon : -epsilon);
   }
 };
+
+/// A point of a shape that was chosen without a ray.
+struct ShapePoint {
+  Vec3 p, normal;  ///< unit, as the shape orients it
+  uint32_t primitive = 0;
+  Vec2 barycentric{};
+};
+
+/// Uniform by area: where u.x lies tells the triangle of a mesh, the height on a sphere.
+VIRGA_HD inline ShapePoint uniformPointOnShape(const ShapeView& shape, Vec2 u) {
+  if (shape.kind == ShapeView::Kind::sphere) {
+    const Vec3 n = uniformSphere(u);
+    return {shape.center + n * shape.radius, n * shape.orientation};
+  }
+  if (shape.kind == ShapeView::Kind::cylinder) {
+    const float phi = kTwoPi * u.x;
+    const Vec3 n = shape.axisX * std::cos(phi) + shape.axisY * std::sin(phi);
+    return {shape.center + shape.normal * (u.y * shape.length) + n * shape.radius, n * shape.orientation};
+  }
+  if (shape.kind == ShapeView::Kind::disk) {
+    const Vec2 d = uniformDisk(u);
+    const Frame frame(shape.normal);
+    return {shape.center + (frame.s * d.x + frame.t * d.y) * shape.radius, shape.normal * shape.orientation};
+  }
+  const auto pick = shape.triangleChoice.sample(u.x);
+  const auto& triangle = shape.triangles[pick.index];
+  const Vec3 a = shape.positions[triangle[0]], b = shape.positions[triangle[1]], c = shape.positions[triangle[2]];
+  const Vec2 uv = uniformTriangle({pick.remapped, u.y});
+  return {a * (1 - uv.x - uv.y) + b * uv.x + c * uv.y, normalize(cross(b - a, c - a)) * shape.orientation,
+          static_cast<uint32_t>(pick.index), uv};
+}
 
 /// Relative error of a computed hit position: 17 times the rounding of a coordinate, so that no ray meets again what it
 /// leaves (tests/scene/test_limits.cpp), and small beside shapes even where they lie far from the origin.
