@@ -9,11 +9,14 @@ namespace {
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
 constexpr int kGroup = 32;
 
+/// Radius of a light that is spread, in spacings of the lights.
+constexpr float kRadiusSpacings = 2;
+
 /// The layers that are not upsampled: those before the others.
 constexpr int kDirectLayers = static_cast<int>(Layer::surfaceToSurface);
 using DirectLight = std::array<Rgb, kDirectLayers>;
 
-/// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same ones in each frame.
+/// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same in each frame.
 Upsampling::Light sampled(const ImsPixels& pixels, Upsampling::Pixel p, SampleId id, int samples) {
   Upsampling::Light light;
   const float share = 1 / static_cast<float>(samples);
@@ -44,7 +47,11 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   lights_ = nullptr;
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
   VirtualLights traced = traceVirtualLights(scene, {options.walks, maxDepth}, {seed, 0, 0, index}, stop);
-  auto lights = std::make_unique<FrameLights>(scene, std::move(traced), stop);
+  FrameLights::Options kept;
+  kept.most = options.frameLights;
+  kept.turn = FixedNumbers{index}.shift();
+  if (options.frame.visibility != ReceiverBatch::Visibility::maps) kept.shadows = FrameLights::ShadowMapping::none;
+  auto lights = std::make_unique<FrameLights>(scene, std::move(traced), kept, stop);
   if (stop.stop_requested()) return false;
   lights_ = std::move(lights);
   lightsOf_ = index, around_ = around;
@@ -54,19 +61,24 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
 bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
                          const std::stop_token& stop, PassFrame& frame) {
   if (!prepareLights(scene, options, seed, index, stop)) return false;
-  const FramePixels pixels(scene, *lights_, options, index);
-  const ImsPixels paths(scene, lights_->virtualLights(), options);
+  ImsOptions own = options;
+  if (!(own.frame.near.bound > 0)) own.frame.near.bound = 1 / square(kRadiusSpacings * lights_->spacing());
+  const FramePixels pixels(scene, *lights_, own, index);
+  own.compensate = ImsOptions::Compensate::path;  // of pixels that are left to paths
+  const ImsPixels paths(scene, lights_->virtualLights(), own);
   const auto idOf = [&](int x, int y) { return SampleId{seed, 0, scene.camera.pixelStream(x, y), index}; };
   const auto numberOf = [&](int x, int y) {
     return static_cast<size_t>(y) * static_cast<size_t>(frame.width()) + static_cast<size_t>(x);
   };
 
+  // Panes are looked through by paths alone, and paths of one segment see lamps alone.
+  const bool marches = !scene.view.thinGlass && (options.path.maxDepth < 0 || options.path.maxDepth >= 2);
   const size_t all = numberOf(0, frame.height());
   std::vector<PixelFeatures> features(all);
   std::vector<DirectLight> direct(all);
   forEachPixel(frame, stop, [&](int x, int y) {
     LayerRadiance radiance;
-    if (!pixels.direct(x, y, features[numberOf(x, y)], radiance))
+    if (!pixels.direct(x, y, features[numberOf(x, y)], radiance) || !marches)
       radiance = paths.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
     std::copy_n(radiance.value, kDirectLayers, direct[numberOf(x, y)].begin());
   });

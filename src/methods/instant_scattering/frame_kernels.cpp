@@ -48,6 +48,14 @@ void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, f
   kernels::lightFog(lamps, ray, shift, t, r, g, b);
 }
 
+void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind kind, const KernelShadowMap& map,
+                    float* seen) {
+  if (kind == EndKind::lambertian)
+    kernels::seenThroughMap<EndKind::lambertian>(light, to, map, seen);
+  else
+    kernels::seenThroughMap<EndKind::isotropic>(light, to, map, seen);
+}
+
 void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen) {
   kernels::seenThroughTable(light, to, table, seen);
 }

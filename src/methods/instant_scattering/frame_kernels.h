@@ -52,6 +52,14 @@ struct DepthTable {
   float reach;         ///< [unit] distance of the last radius: there is nothing beyond
 };
 
+/// Distances to the nearest surface around a light: ShadowMapsView, for one of them.
+struct KernelShadowMap {
+  const float* depths;
+  int resolution;
+  float bias;         ///< of a receiver that faces the light, relative to its distance
+  float leastCosine;  ///< at flatter angles the bias grows no more
+};
+
 /// Fixed points of lamps, each of which lights one point of a ray through fog.
 struct FogLamps {
   static constexpr int kCount = 8;
@@ -141,6 +149,28 @@ VIRGA_HD static inline void octahedral(float x, float y, float z, float& u, floa
   v = z >= 0 ? b : foldedB;
 }
 
+/// Sets `seen` to 0 where a light's shadow map says that a surface is in the way: ShadowMapsView::visible().
+template <EndKind receiver>
+VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelReceivers& to, const KernelShadowMap& map,
+                                           float* seen) {
+  const float* __restrict depths = map.depths;
+  const int resolution = map.resolution;
+  const auto size = static_cast<float>(resolution);
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
+    const float distance = std::sqrt(x * x + y * y + z * z);
+    float u, v;
+    octahedral(x, y, z, u, v);
+    const int column = static_cast<int>(std::fmin((u + 1) * (0.5f * size), size - 1));
+    const int row = static_cast<int>(std::fmin((v + 1) * (0.5f * size), size - 1));
+    const float depth = depths[row * resolution + column];
+    const float along = std::fabs(to.ax[i] * x + to.ay[i] * y + to.az[i] * z) / distance;
+    const float cosine = receiver == EndKind::lambertian ? std::fmax(along, map.leastCosine) : 1;
+    seen[i] = distance * (1 - std::fmin(map.bias / cosine, 0.5f)) <= depth ? seen[i] : 0;
+  }
+}
+
 /// Multiplies `seen` by the transmittance that a light's table knows.
 VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
                                              float* seen) {
@@ -226,6 +256,9 @@ void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& 
                  const float* const seen[3], const NearField& near);
 /// exp(-sigmaT d) for each receiver.
 void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen);
+/// Multiplies `seen` by 1 or 0: what the light's shadow map says.
+void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind kind, const KernelShadowMap& map,
+                    float* seen);
 /// Multiplies `seen` by what the light's table says.
 void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen);
 /// kernels::lightFog

@@ -1,24 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame_lights.h"
 
+#include <bit>
+
+#include "core/octahedral.h"
 #include "core/parallel.h"
+#include "methods/instant_scattering/shadow_maps.h"
 #include "transport/media_walk.h"
 
 namespace virga {
 namespace {
 
-using kernels::octahedral;
-
-/// Direction at (u, v) in [-1, 1]^2 of the octahedral map: the inverse of kernels::octahedral().
-Vec3 directionAt(float u, float v) {
-  const float z = 1 - std::fabs(u) - std::fabs(v);
-  if (z >= 0) return normalize(Vec3(u, v, z));
-  return normalize(Vec3(std::copysign(1 - std::fabs(v), u), std::copysign(1 - std::fabs(u), v), z));
-}
+/// Smaller maps than a picture of one light would need: there are a thousand of them.
+constexpr int kMapResolution = 64, kMapCells = 1000;
 
 Vec3 nodeDirection(int column, int row) {
   const auto place = [](int n) { return 2 * static_cast<float>(n) / (DepthTable::kSide - 1) - 1; };
-  return directionAt(place(column), place(row));
+  return fromOctahedron({place(column), place(row)});
 }
 
 /// How far from a point there are media, as far as the table's directions tell [unit].
@@ -57,6 +55,64 @@ void addInterval(const SceneView& view, const MediaState& media, const Ray& ray,
   }
 }
 
+FrameLights::Light lightOf(const SceneView& view, const LightVertex& v, int walks) {
+  const bool onSurface = v.kind == VertexKind::surface;
+  FrameLights::Light light{{}, EndKind::lambertian, &v, 1 / static_cast<float>(walks), v.surface < 0};
+  float g = 0;
+  if (!onSurface) light.plain = plainPhase(view.media[v.medium].phaseAt(v.p), light.kind, g);
+  const Vec3 axis = onSurface ? v.normal : v.wi;
+  const Rgb weight = v.weight * light.share;
+  light.kernel = {v.p.x, v.p.y, v.p.z, axis.x, axis.y, axis.z, weight.r, weight.g, weight.b, g};
+  return light;
+}
+
+Vec3 positionOf(const FrameLights::Light& l) { return {l.kernel.px, l.kernel.py, l.kernel.pz}; }
+
+/// A place on a curve that fills the box (Morton 1966): neighbours on it are neighbours in space.
+uint64_t placeOnCurve(Vec3 p, const Bounds& box) {
+  constexpr int kBits = 12;
+  uint64_t code = 0;
+  uint32_t cell[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const float extent = box.extent()[axis];
+    const float share = extent > 0 ? (p[axis] - box.lo[axis]) / extent : 0;
+    cell[axis] = static_cast<uint32_t>(clamp(share, 0, 1) * ((1 << kBits) - 1));
+  }
+  for (int bit = kBits - 1; bit >= 0; --bit)
+    for (const uint32_t c : cell) code = code << 1 | (c >> bit & 1u);
+  return code;
+}
+
+/// About `most` of the lights, those at even steps of their summed weights along the curve.
+std::vector<FrameLights::Light> thinned(std::vector<FrameLights::Light> all, size_t most, float turn) {
+  if (all.size() <= most) return all;
+  Bounds box;
+  for (const auto& l : all) box.extend(positionOf(l));
+  std::vector<std::pair<uint64_t, size_t>> order;
+  for (size_t i = 0; i < all.size(); ++i) order.emplace_back(placeOnCurve(positionOf(all[i]), box), i);
+  std::sort(order.begin(), order.end());
+  const auto weightOf = [](const FrameLights::Light& l) {
+    return static_cast<double>(std::max(l.kernel.r, std::max(l.kernel.g, l.kernel.b)));
+  };
+  double total = 0;
+  for (const auto& l : all) total += weightOf(l);
+  const double step = total / static_cast<double>(most);
+  std::vector<FrameLights::Light> kept;
+  double sum = 0, next = step * static_cast<double>(turn);
+  for (const auto& [place, i] : order) {
+    const double weight = weightOf(all[i]);
+    sum += weight;
+    if (!(next < sum)) continue;
+    double stands = 0;
+    for (; next < sum; next += step) stands += step;
+    const auto scale = static_cast<float>(stands / weight);
+    FrameLights::Light l = all[i];
+    l.kernel.r *= scale, l.kernel.g *= scale, l.kernel.b *= scale, l.share *= scale;
+    kept.push_back(l);
+  }
+  return kept;
+}
+
 }  // namespace
 
 bool plainPhase(const PhaseFunction& phase, EndKind& kind, float& g) {
@@ -70,22 +126,19 @@ bool plainPhase(const PhaseFunction& phase, EndKind& kind, float& g) {
   return phase.get<Isotropic>() != nullptr;
 }
 
-FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const std::stop_token& stop)
+FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options& options, const std::stop_token& stop)
     : virtualLights_(std::move(lights)), channels_(scene.view.chromatic ? 3 : 1) {
   const SceneView& view = scene.view;
-  const float share = 1 / static_cast<float>(virtualLights_.walks());
-  for (const VertexKind kind : {VertexKind::surface, VertexKind::medium})
-    for (const LightVertex& v : virtualLights_.lights) {
-      if (v.kind != kind) continue;
-      const bool onSurface = kind == VertexKind::surface;
-      Light light{{}, EndKind::lambertian, &v, v.surface < 0};
-      float g = 0;
-      if (!onSurface) light.plain = plainPhase(view.media[v.medium].phaseAt(v.p), light.kind, g);
-      const Vec3 axis = onSurface ? v.normal : v.wi;
-      const Rgb weight = v.weight * share;
-      light.kernel = {v.p.x, v.p.y, v.p.z, axis.x, axis.y, axis.z, weight.r, weight.g, weight.b, g};
-      lights_.push_back(light);
-    }
+  std::vector<Light> onSurfaces, inMedia;
+  for (const LightVertex& v : virtualLights_.lights)
+    (v.kind == VertexKind::surface ? onSurfaces : inMedia).push_back(lightOf(view, v, virtualLights_.walks()));
+  const auto most = static_cast<size_t>(options.most);
+  const size_t surfaceShare = std::max(most / 2, most - std::min(most, inMedia.size()));
+  onSurfaces = thinned(std::move(onSurfaces), surfaceShare, options.turn);
+  inMedia = thinned(std::move(inMedia), std::max<size_t>(1, most - std::min(most - 1, onSurfaces.size())), options.turn);
+  lights_ = std::move(onSurfaces);
+  lights_.insert(lights_.end(), inMedia.begin(), inMedia.end());
+  if (options.shadows == ShadowMapping::maps) makeMaps(scene, stop);
   if (view.media.size == 0) return;
   between_ = Between::media;
   if (sameMediaEverywhere(view)) {
@@ -99,6 +152,37 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const std::st
     if (media.vacuum()) between_ = Between::nothing;
   }
   if (between_ == Between::media) makeTables(scene, stop);
+}
+
+float FrameLights::spacing() const {
+  const bool anyInMedia = !lights_.empty() && lights_.back().vertex->kind == VertexKind::medium;
+  std::vector<float> along[3];
+  for (const Light& l : lights_) {
+    if (anyInMedia && l.vertex->kind != VertexKind::medium) continue;
+    for (int axis = 0; axis < 3; ++axis) along[axis].push_back(positionOf(l)[axis]);
+  }
+  if (along[0].empty()) return 1;
+  const auto count = static_cast<float>(along[0].size());
+  float volume = 1;
+  for (std::vector<float>& a : along) {
+    std::sort(a.begin(), a.end());
+    volume *= a[a.size() * 19 / 20] - a[a.size() / 20];  // a few stray far
+  }
+  return std::cbrt(volume / count);
+}
+
+void FrameLights::makeMaps(const Scene& scene, const std::stop_token& stop) {
+  const SurfacePoints points(scene.view, kMapCells, 0);
+  std::vector<LightVertex> vertices;
+  for (const Light& l : lights_) vertices.push_back(*l.vertex);
+  const ShadowMaps maps(points, vertices, {.resolution = kMapResolution}, stop);
+  const size_t texels = lights_.size() * kMapResolution * kMapResolution;
+  maps_.resize(texels);
+  // In floats: no vector code gathers halves of words.
+  parallelFor(static_cast<int64_t>(texels / kMapResolution), 64, [&](int64_t row) {
+    for (size_t i = static_cast<size_t>(row) * kMapResolution; i < static_cast<size_t>(row + 1) * kMapResolution; ++i)
+      maps_[i] = std::bit_cast<float>(static_cast<uint32_t>(maps.view().depths[i]) << 16);
+  });
 }
 
 void FrameLights::makeTables(const Scene& scene, const std::stop_token& stop) {
@@ -133,21 +217,25 @@ void FrameLights::fillTable(const Scene& scene, size_t i) {
     }
 }
 
-void FrameLights::lookFrom(size_t i, const KernelReceivers& to, float* seen[3]) const {
+void FrameLights::lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const {
   const KernelLight& light = lights_[i].kernel;
   for (int c = 0; c < 3; ++c) {
     if (c >= channels_) {
       seen[c] = seen[0];
       continue;
     }
-    if (between_ == Between::fog) {
+    if (between_ == Between::fog)
       lookThroughFog(light, to, fog_[c], seen[c]);
-      continue;
-    }
-    std::fill_n(seen[c], to.count, 1.f);
-    if (between_ != Between::media) continue;
+    else
+      std::fill_n(seen[c], to.count, 1.f);
     const size_t table = i * static_cast<size_t>(channels_) + static_cast<size_t>(c);
-    lookThroughTable(light, to, {&depth_[table * DepthTable::kSize], reach_[i]}, seen[c]);
+    if (between_ == Between::media)
+      lookThroughTable(light, to, {&depth_[table * DepthTable::kSize], reach_[i]}, seen[c]);
+    if (maps_.empty()) continue;
+    lookThroughMap(light, to, kind,
+                   {&maps_[i * kMapResolution * kMapResolution], kMapResolution,
+                    ShadowMapsView::kBias * 2 / kMapResolution, ShadowMapsView::kLeastCosine},
+                   seen[c]);
   }
 }
 

@@ -12,15 +12,23 @@ namespace virga {
 /// The virtual lights of a frame as its kernels take them. They depend on the scene, not on the camera.
 class FrameLights {
  public:
+  enum class ShadowMapping { none, maps };
+  struct Options {
+    int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
+    ShadowMapping shadows = ShadowMapping::maps;
+    float turn = 0.5f;  ///< in [0, 1): which ones
+  };
   struct Light {
     KernelLight kernel;
     EndKind kind;
     const LightVertex* vertex;  ///< in virtualLights()
+    float share;                ///< by which the vertex's weight counts
     bool plain;  ///< the kernels know its bsdf or phase function; of others the kernel's light says only where they are
   };
 
-  /// A stop leaves lights out.
-  FrameLights(const Scene& scene, VirtualLights lights, const std::stop_token& stop);
+  /// Of many lights few are kept, evenly in space and by their weight; all of these stand for as much light, and in
+  /// expectation they light as all would. A stop leaves lights out.
+  FrameLights(const Scene& scene, VirtualLights lights, const Options& options, const std::stop_token& stop);
   FrameLights(const FrameLights&) = delete;
   FrameLights& operator=(const FrameLights&) = delete;
 
@@ -28,13 +36,18 @@ class FrameLights {
   /// Those on surfaces, then those in media.
   const std::vector<Light>& lights() const { return lights_; }
 
-  /// Transmittance from light number i to the receivers, for each channel; surfaces are not looked at. `seen` points to
-  /// three arrays of to.count values; on return the second and the third may be the same as the first.
-  void lookFrom(size_t i, const KernelReceivers& to, float* seen[3]) const;
+  /// Of the lights in media, or of all where there are none there: edge of the cube that each has for itself [unit].
+  float spacing() const;
+
+  /// Transmittance from light number i to receivers of a kind, for each channel; surfaces are looked at where there are
+  /// shadow maps. `seen` points to three arrays of to.count values; on return the second and the third may be the same
+  /// as the first.
+  void lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const;
 
  private:
   enum class Between { nothing, fog, media };
 
+  void makeMaps(const Scene& scene, const std::stop_token& stop);
   void makeTables(const Scene& scene, const std::stop_token& stop);
   void fillTable(const Scene& scene, size_t i);
 
@@ -45,6 +58,7 @@ class FrameLights {
   int channels_ = 1;          ///< that differ
   std::vector<float> depth_;  ///< tables of the first light, channel by channel, of the second...
   std::vector<float> reach_;  ///< of each light's tables
+  std::vector<float> maps_;   ///< shadow maps of the lights; empty: there are none
 };
 
 /// How the kernels know a phase function, and its g; false if they do not.

@@ -15,14 +15,12 @@ constexpr std::string_view kMode[] = {"exact", "fast", "frame"};
 constexpr std::string_view kCompensate[] = {"path", "sampled", "none", "spread"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
-constexpr std::string_view kVisibility[] = {"exact", "none"};
+constexpr std::string_view kVisibility[] = {"exact", "none", "maps"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
-/// The same where all virtual lights light everything, so that none must be seen by itself.
-constexpr float kFrameRadiusShare = 0.1f;
-constexpr int kFrameWalks = 256;
+constexpr int kFrameWalks = 2048;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -63,7 +61,10 @@ ImsSettings::ImsSettings(const Settings& settings) {
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
-  o.gather.visibility = reader.choice("visibility", kVisibility).value_or(0) == 0;
+  o.frame.visibility = static_cast<ReceiverBatch::Visibility>(reader.choice("visibility", kVisibility).value_or(isFrame ? 2 : 0));
+  o.gather.visibility = o.frame.visibility != ReceiverBatch::Visibility::none;
+  if (!isFrame && o.frame.visibility == ReceiverBatch::Visibility::maps)
+    throw Error("--set ims.visibility=maps needs ims.mode=frame");
   o.gather.lostLight = o.show == ImsOptions::Show::lost;
   CompensationOptions& c = o.compensation;
   c.levels = reader.integer("levels", -1).value_or(-1);
@@ -81,8 +82,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
   if (o.show != ImsOptions::Show::picture && o.mode != ImsOptions::Mode::exact)
     throw Error("--set ims.show needs ims.mode=exact: others do not tell parts of the picture apart");
-  if (isFrame && o.compensate == ImsOptions::Compensate::path)
-    throw Error("--set ims.compensation=path needs ims.mode=exact or fast: a frame follows no paths");
+  if (isFrame && (o.compensate == ImsOptions::Compensate::path || o.compensate == ImsOptions::Compensate::sampled))
+    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread or none");
   if (!isFrame && o.compensate == ImsOptions::Compensate::spread)
     throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);
@@ -95,29 +96,30 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   o.path.rrDepth = rrDepth_.value_or(scene.integrator.rrDepth);
   const bool tracked = std::any_of(scene.view.media.begin(), scene.view.media.end(),
                                    [](const MediumView& medium) { return !medium.homogeneous; });
-  for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
-    amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  const int lights = tracked ? kLightsWhereTracked : kLights;
+  for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
+    amount->lights = isFrame ? lights : lights_.value_or(lights);
+  if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   o.walks = walks_.value_or(isFrame ? kFrameWalks : o.walks);
-  o.compensation.radius = radius_.value_or((isFrame ? kFrameRadiusShare : kRadiusShare) * extentOf(scene.view));
+  o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
   o.gather.bound = 1 / square(o.compensation.radius);
   const bool spread = o.compensate == ImsOptions::Compensate::spread;
-  o.frame = {{spread ? NearField::Kind::spread : NearField::Kind::clamped, o.gather.bound},
-             o.path.maxDepth,
-             o.gather.visibility ? ReceiverBatch::Visibility::exact : ReceiverBatch::Visibility::none};
+  o.frame.near = {spread ? NearField::Kind::spread : NearField::Kind::clamped, radius_ ? o.gather.bound : 0};
   return o;
 }
 
 SettingValues valuesOf(const ImsOptions& o) {
+  const bool isFrame = o.mode == ImsOptions::Mode::frame, byLights = isFrame && !(o.frame.near.bound > 0);
   const CompensationOptions& c = o.compensation;
   return {{"mode", wordOf(kMode, o.mode)},
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
-          {"lights", std::to_string(o.amount.lights)},
+          {"lights", std::to_string(isFrame ? o.frameLights : o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
-          {"radius", fmt::format("{}", c.radius)},
-          {"bound", fmt::format("{}", o.gather.bound)},
+          {"radius", byLights ? "by the lights" : fmt::format("{}", c.radius)},
+          {"bound", byLights ? "by the lights" : fmt::format("{}", o.gather.bound)},
           {"compensation", wordOf(kCompensate, o.compensate)},
           {"levels", std::to_string(c.levels)},
           {"ending", wordOf(kEnding, c.ending)},
@@ -126,7 +128,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"p1", std::to_string(c.amounts[0].walks)},
           {"p2", std::to_string(c.amounts[1].walks)},
           {"transmittance", wordOf(kTransmittance, c.localMeanTransmittance ? 1 : 0)},
-          {"visibility", wordOf(kVisibility, o.gather.visibility ? 0 : 1)},
+          {"visibility", wordOf(kVisibility, o.frame.visibility)},
           {"show", wordOf(kShow, o.show)},
           {"max_depth", std::to_string(o.path.maxDepth)},
           {"rr_depth", std::to_string(o.path.rrDepth)}};

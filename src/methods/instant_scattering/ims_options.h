@@ -20,7 +20,8 @@ struct ImsOptions {
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray
   GatherOptions gather;
-  ReceiverBatch::Options frame;  ///< frame: how its receivers are lit
+  int frameLights = 1300;        ///< frame: virtual lights that are kept
+  ReceiverBatch::Options frame;  ///< frame: how receivers are lit; a bound of 0: as the lights lie
   Compensate compensate = Compensate::path;
   CompensationOptions compensation;
   Show show = Show::picture;

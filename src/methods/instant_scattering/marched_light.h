@@ -44,6 +44,7 @@ struct FixedNumbers {
     return {turned(choice, 0.4142136f), {turned(0.5f + n * 0.7548777f, 0.7320508f), turned(0.5f + n * 0.5698403f, 0.2360680f)}};
   }
 
+
  private:
   VIRGA_HD float turned(float x, float by) const {
     const float y = x + by * static_cast<float>(pass % 4096u);

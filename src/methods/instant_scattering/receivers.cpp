@@ -34,17 +34,7 @@ ReceiverBatch::ReceiverBatch() {
   groups_[kGroups - 1].plain = false;
 }
 
-void ReceiverBatch::add(const SceneView& scene, const Receiver& receiver) { add(scene, receiver, VertexKind::none); }
-
-void ReceiverBatch::addBehind(const SceneView& scene, const Receiver& receiver, VertexKind x1) {
-  add(scene, receiver, x1);
-}
-
-bool ReceiverBatch::empty() const {
-  return std::all_of(std::begin(groups_), std::end(groups_), [](const Group& g) { return g.px.empty(); });
-}
-
-void ReceiverBatch::add(const SceneView& scene, const Receiver& receiver, VertexKind before) {
+void ReceiverBatch::add(const SceneView& scene, const Receiver& receiver) {
   if (isBlack(receiver.throughput)) return;
   const Vertex& v = receiver.vertex;
   Rgb scattered = v.albedo;
@@ -65,7 +55,6 @@ void ReceiverBatch::add(const SceneView& scene, const Receiver& receiver, Vertex
   group.anisotropy.push_back(g);
   group.receivers.push_back(receiver);
   if (plain) group.receivers.back().throughput *= scattered;
-  group.before.push_back(before);
 }
 
 void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const Options& options,
@@ -91,17 +80,12 @@ void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const 
 
 void ReceiverBatch::look(const Scene& scene, const FrameLights& lights, size_t i, Group& group, const Options& options,
                          float* seen[3]) {
-  lights.lookFrom(i, group.view(), seen);
+  lights.lookFrom(i, group.view(), group.plain ? group.kind : EndKind::isotropic, seen);
   const FrameLights::Light& from = lights.lights()[i];
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const bool mayBeTooLong = options.maxDepth >= 0 && 3 + from.vertex->depth > options.maxDepth;
-  if (!mayBeTooLong && options.visibility == Visibility::none) return;
+  if (options.visibility != Visibility::exact) return;
   for (size_t n = 0; n < group.receivers.size(); ++n) {
-    const int events = group.before[n] == VertexKind::none ? 1 : 2;
-    const bool tooLong = options.maxDepth >= 0 && events + 1 + from.vertex->depth > options.maxDepth;
-    const bool hidden = options.visibility == Visibility::exact &&
-                        !unobstructed(scene.view, rays, group.receivers[n].vertex, positionOf(from.kernel));
-    if (!tooLong && !hidden) continue;
+    if (unobstructed(scene.view, rays, group.receivers[n].vertex, positionOf(from.kernel))) continue;
     for (int c = 0; c < 3; ++c) seen[c][n] = 0;
   }
 }
@@ -116,7 +100,6 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
                                  const NearField& near, float* const seen[3]) {
   const FrameLights::Light& from = lights.lights()[i];
   const LightVertex& vertex = *from.vertex;
-  const float share = 1 / static_cast<float>(lights.virtualLights().walks());
   for (size_t n = 0; n < group.receivers.size(); ++n) {
     if (seen[0][n] == 0 && seen[1][n] == 0 && seen[2][n] == 0) continue;
     const Vertex& x = group.receivers[n].vertex;
@@ -130,7 +113,7 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
                            : cosine / d2 * (1 - clampedShareOf(cosine * receiving / d2, near.bound));
     // What plain receivers scatter apart from direction is in their throughput.
     const Rgb scattered = group.plain ? Rgb(plainScattering(group, n, w)) : x.scattering(w);
-    const Rgb value = scattered * intensity(lights.virtualLights(), scene, vertex, -w) * (term * share);
+    const Rgb value = scattered * intensity(lights.virtualLights(), scene, vertex, -w) * (term * from.share);
     for (int c = 0; c < 3; ++c) group.sum[c][n] += value[c] * seen[c][n];
   }
 }
@@ -139,9 +122,7 @@ void ReceiverBatch::distribute(const Group& group, VertexKind lights, const Foun
   for (size_t n = 0; n < group.receivers.size(); ++n) {
     const Receiver& r = group.receivers[n];
     const Rgb sum(group.sum[0][n], group.sum[1][n], group.sum[2][n]);
-    const bool direct = group.before[n] == VertexKind::none;
-    const VertexKind x1 = direct ? r.vertex.kind : group.before[n], x2 = direct ? lights : r.vertex.kind;
-    found(r.pixel, x1, x2, sum * r.throughput);
+    found(r.pixel, r.vertex.kind, lights, sum * r.throughput);
   }
 }
 

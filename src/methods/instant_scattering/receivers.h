@@ -9,7 +9,7 @@
 
 namespace virga {
 
-/// A point that all virtual lights of a frame light.
+/// A point on an eye ray, x1, that all virtual lights of a frame light.
 struct Receiver {
   Vertex vertex;
   Rgb throughput;  ///< to the eye, what the vertex scatters left out
@@ -19,19 +19,14 @@ struct Receiver {
 /// Receivers of a few pixels, gathered from all lights at once.
 class ReceiverBatch {
  public:
-  enum class Visibility { exact, none };
+  enum class Visibility { exact, none, maps };  ///< maps: as far as the lights have them
   struct Options {
     NearField near;
-    int maxDepth = -1;  ///< of whole paths, in segments; -1: no limit
     Visibility visibility = Visibility::exact;
   };
 
   ReceiverBatch();
-  /// Of light that reaches x1 itself: x2 are the lights.
   void add(const SceneView& scene, const Receiver& receiver);
-  /// Of light that reaches x2, from where it goes on to an x1 of kind `x1`.
-  void addBehind(const SceneView& scene, const Receiver& receiver, VertexKind x1);
-  bool empty() const;
 
   /// What the lights send by way of the receivers: found(Receiver::pixel, kind of x1, kind of x2, light).
   using Found = std::function<void(int, VertexKind, VertexKind, Rgb)>;
@@ -44,13 +39,11 @@ class ReceiverBatch {
     bool plain = true;  ///< otherwise light arrives by the vertices' own scattering
     std::vector<float> px, py, pz, ax, ay, az, anisotropy, sum[3], seen[3];
     std::vector<Receiver> receivers;
-    std::vector<VertexKind> before;  ///< x1, if the receiver is x2; none: it is x1 itself
 
     KernelReceivers view();
     void clearSums();
   };
 
-  void add(const SceneView& scene, const Receiver& receiver, VertexKind before);
   /// Scattering times cosine of a plain receiver.
   static float plainScattering(const Group& group, size_t n, Vec3 w);
   static void look(const Scene& scene, const FrameLights& lights, size_t i, Group& group, const Options& options,
