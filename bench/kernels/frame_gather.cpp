@@ -77,7 +77,7 @@ void frame(benchmark::State& state) {
     for (const KernelLight& light : all) {
       if (table) {
         std::fill(r.seen.begin(), r.seen.end(), 1.f);
-        lookThroughTable(light, view, {depth.data(), 1.8f}, r.seen.data());
+        lookThroughTable(light, view, {depth.data(), {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1.8f}}, r.seen.data());
       } else {
         lookThroughFog(light, view, 0.85f, r.seen.data());
       }

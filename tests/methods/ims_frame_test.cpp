@@ -24,7 +24,7 @@ RenderSession frames(const std::string& elements, int passes, const SettingValue
                   {.passes = passes, .seed = seed, .layers = LayerMask::all(), .method = "ims", .settings = settings});
 }
 
-/// Light that has scattered more than once: what virtual lights are for.
+/// Light that virtual lights bring.
 Image indirect(const RenderSession& session) {
   Image sum = session.film().layer(Layer::surfaceToSurface);
   for (const Layer layer : {Layer::mediaToSurface, Layer::surfaceToMedia, Layer::mediaToMedia}) {
@@ -179,7 +179,7 @@ TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
 TEST(FrameLights, TablesKnowTheMedia) {
   const SceneSnapshot scene = sceneOf(plume(8));
   const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 40}, {3, 0, 0, 0}),
-                           FrameLights::ShadowMapping::none, {});
+                           {.shadows = FrameLights::ShadowMapping::none}, {});
   ASSERT_GT(lights.lights().size(), 40u);
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
   std::vector<float> x, y, z, none(64, 0.f), seen(64);

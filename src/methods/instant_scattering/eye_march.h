@@ -83,7 +83,7 @@ VIRGA_HD Rgb marchedTransmittance(const SceneView& scene, const Rays& rays, Medi
 
 /// An eye ray: the media that it passes, by marching, and the surface that it meets.
 struct MarchedEye {
-  static constexpr int kSteps = 64;  ///< through each stretch of media
+  static constexpr int kSteps = 128;  ///< through each stretch of media
   static constexpr int kMostStretches = 8, kMostSteps = kMostStretches * (kSteps + 1);
 
   /// A step along the ray. Plain numbers, so that an eye is not cleared before it is filled.

@@ -41,15 +41,22 @@ struct NearField {
   float bound = 1;  ///< [1/unit^2]
 };
 
-/// Optical depths around a point: directions at the nodes of an octahedral map, and along each of them distances that
-/// grow as squares, so that they are densest near the point.
+/// Where a table of optical depths looks from a point: all around or, from outside of the media, into the cone that they
+/// fill. Between two distances, radii whose steps grow, so that they are densest near the point.
+struct DepthView {
+  float ux, uy, uz, vx, vy, vz, wx, wy, wz;  ///< an orthonormal frame, w along the cone
+  float stretch;                             ///< 2 / (1 - cosine of the cone's half angle): 1 - cosine is stretched by it
+  float first, last;                         ///< [unit] there are no media before and beyond
+};
+
+/// Optical depths at directions and distances: nodes of an octahedral map of the stretched directions, and radii.
 struct DepthTable {
   static constexpr int kSide = 12;   ///< nodes along the map's edge; those on its border are there twice
   static constexpr int kRadii = 24;  ///< the first at 0
   static constexpr int kSize = kSide * kSide * kRadii;
 
   const float* depth;  ///< [row][column][radius]
-  float reach;         ///< [unit] distance of the last radius: there is nothing beyond
+  DepthView view;
 };
 
 /// Distances to the nearest surface around a light: ShadowMapsView, for one of them.
@@ -176,14 +183,19 @@ VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelR
                                              float* seen) {
   constexpr int kSide = DepthTable::kSide, kRadii = DepthTable::kRadii;
   const float* __restrict depth = table.depth;
-  const float scale = (kRadii - 1) * (kRadii - 1) / table.reach;
+  const DepthView f = table.view;
+  const float scale = (kRadii - 1) * (kRadii - 1) / (f.last - f.first);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
     const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
+    const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / distance;
+    const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
+    const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
+    const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
     float u, v;
-    octahedral(x, y, z, u, v);
+    octahedral(a * turned, b * turned, c, u, v);
     u = (u + 1) * (0.5f * (kSide - 1)), v = (v + 1) * (0.5f * (kSide - 1));
-    const float m = std::fmin(std::sqrt(std::sqrt(x * x + y * y + z * z) * scale), kRadii - 1.001f);
+    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), kRadii - 1.001f);
     const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)), row = static_cast<int>(std::fmin(v, kSide - 1.001f)),
               radius = static_cast<int>(m);
     const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row), fm = m - static_cast<float>(radius);

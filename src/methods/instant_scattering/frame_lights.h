@@ -57,7 +57,7 @@ class FrameLights {
   Rgb fog_;                   ///< extinction of the homogeneous medium that is everywhere [1/unit]
   int channels_ = 1;          ///< that differ
   std::vector<float> depth_;  ///< tables of the first light, channel by channel, of the second...
-  std::vector<float> reach_;  ///< of each light's tables
+  std::vector<DepthView> views_;  ///< of each light's tables
   std::vector<float> maps_;   ///< shadow maps of the lights; empty: there are none
 };
 

@@ -9,9 +9,9 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
      "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing is "
      "drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
-    {"samples", "16", "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
+    {"samples", "16; frame: 8", "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
-    {"walks", "8192; frame: 2048", "random walks from the lights in each pass"},
+    {"walks", "8192; frame: 16384", "random walks from the lights in each pass"},
     {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
      "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of all"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},

@@ -20,7 +20,8 @@ constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
-constexpr int kFrameWalks = 2048;
+/// Of a frame.
+constexpr int kFrameWalks = 16384, kFramePoints = 8;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -53,12 +54,13 @@ ImsSettings::ImsSettings(const Settings& settings) {
   const SettingsReader reader(settings, kImsSettings, "ims");
   ImsOptions& o = given_;
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
-  o.samples = reader.integer("samples", 1).value_or(o.samples);
+
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   walks_ = reader.integer("walks", 1);
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  o.samples = reader.integer("samples", 1).value_or(isFrame ? kFramePoints : o.samples);
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
   o.frame.visibility = static_cast<ReceiverBatch::Visibility>(reader.choice("visibility", kVisibility).value_or(isFrame ? 2 : 0));

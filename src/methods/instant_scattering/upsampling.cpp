@@ -91,6 +91,7 @@ Upsampling::Weights Upsampling::weights(int x, int y) const {
   const float v = (static_cast<float>(y) - static_cast<float>(spacing_ / 2)) / static_cast<float>(spacing_);
   const int i0 = static_cast<int>(std::floor(u)), j0 = static_cast<int>(std::floor(v));
   const auto wx = spline(u - static_cast<float>(i0)), wy = spline(v - static_cast<float>(j0));
+  const bool seesSurface = maxComponent(here.surface) > 0, seesMedia = maxComponent(here.opacity) > 0;
   Weights w;
   for (int b = 0; b < kTaps; ++b)
     for (int a = 0; a < kTaps; ++a) {
@@ -98,8 +99,8 @@ Upsampling::Weights Upsampling::weights(int x, int y) const {
       const PixelFeatures& there = features(p.x, p.y);
       const float s = there.regular ? wx[static_cast<size_t>(a)] * wy[static_cast<size_t>(b)] : 0;
       const int tap = b * kTaps + a;
-      w.surfaceSum += w.surface[tap] = s > 0 ? s * surfacesAgree(here, there) : 0;
-      w.mediaSum += w.media[tap] = s > 0 ? s * mediaAgree(here, there) : 0;
+      w.surfaceSum += w.surface[tap] = s > 0 && seesSurface ? s * surfacesAgree(here, there) : 0;
+      w.mediaSum += w.media[tap] = s > 0 && seesMedia ? s * mediaAgree(here, there) : 0;
     }
   return w;
 }
