@@ -34,8 +34,8 @@ struct Receivers {
     for (auto& s : sum) s.assign(kReceivers, 0);
   }
   KernelReceivers view() {
-    return {kReceivers,     p[0].data(),    p[1].data(), p[2].data(),   axis[0].data(), axis[1].data(),
-            axis[2].data(), g.data(),       sum[0].data(), sum[1].data(), sum[2].data()};
+    return {kReceivers,     p[0].data(), p[1].data(),   p[2].data(),   axis[0].data(), axis[1].data(),
+            axis[2].data(), g.data(),    sum[0].data(), sum[1].data(), sum[2].data()};
   }
 };
 
@@ -43,7 +43,8 @@ std::vector<KernelLight> lights() {
   Pcg32 random(7);
   std::vector<KernelLight> all;
   for (int i = 0; i < kLights; ++i)
-    all.push_back({random.next(), random.next(), random.next(), 0, 1, 0, random.next(), random.next(), random.next(), 0.6f});
+    all.push_back(
+        {random.next(), random.next(), random.next(), 0, 1, 0, random.next(), random.next(), random.next(), 0.6f});
   return all;
 }
 
@@ -109,7 +110,8 @@ void gridSamples(benchmark::State& state) {
   float out[64];
   for (auto _ : state) {
     // Ray after ray as in a picture of 256 x 256, obliquely across the grid.
-    const Vec3 o(static_cast<float>(pixel % 256) * 0.4f, static_cast<float>(pixel / 256) * 0.4f, 0), d(0.3f, 0.2f, 1.9f);
+    const Vec3 o(static_cast<float>(pixel % 256) * 0.4f, static_cast<float>(pixel / 256) * 0.4f, 0),
+        d(0.3f, 0.2f, 1.9f);
     pixel = (pixel + 1) % (256 * 256);
     if (together)
       lookupAlong(grid, o, d, 64, out);

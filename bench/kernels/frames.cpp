@@ -29,7 +29,8 @@ std::string fog() {
   for (const char* turn : {"", R"(<rotate x="1" angle="90"/>)", R"(<rotate x="1" angle="-90"/>)",
                            R"(<rotate y="1" angle="90"/>)", R"(<rotate y="1" angle="-90"/>)"})
     walls += fmt::format(R"(<shape type="rectangle"><transform name="to_world"><scale value="6"/><translate z="-2"/>{}
-      </transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>)", turn);
+      </transform><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>)",
+                         turn);
   return R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.4"/><float name="albedo" value="0.9"/></medium>)" +
          kSensor.substr(0, kSensor.rfind("</sensor>")) + R"(<ref name="medium" id="fog"/></sensor>)" + walls +
          R"(<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
@@ -41,7 +42,9 @@ std::string smoke() {
   static const std::string file = [] {
     const auto path = std::filesystem::temp_directory_path() / fmt::format("virga_frames.{}.vol", ::getpid());
     writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 128}));
-    std::atexit([] { std::filesystem::remove(std::filesystem::temp_directory_path() / fmt::format("virga_frames.{}.vol", ::getpid())); });
+    std::atexit([] {
+      std::filesystem::remove(std::filesystem::temp_directory_path() / fmt::format("virga_frames.{}.vol", ::getpid()));
+    });
     return path.string();
   }();
   return kSensor + fmt::format(R"(
@@ -50,7 +53,8 @@ std::string smoke() {
     <shape type="cube"><transform name="to_world"><scale value="0.95"/></transform><bsdf type="null"/>
       <medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
         <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
-        <rgb name="albedo" value="0.95"/><float name="scale" value="20"/></medium></shape>)", file);
+        <rgb name="albedo" value="0.95"/><float name="scale" value="20"/></medium></shape>)",
+                               file);
 }
 
 SceneSnapshot own(const std::string& elements) {
@@ -81,9 +85,11 @@ void steady(benchmark::State& state, const std::function<SceneSnapshot()>& build
 }
 
 void add(const std::string& name, const std::function<SceneSnapshot()>& build) {
-  for (const auto& [kind, run] : {std::pair{"first", first}, std::pair{"steady", steady}})
+  for (const auto& [kind, run] : {std::pair{"first", &first}, std::pair{"steady", &steady}})
     benchmark::RegisterBenchmark(fmt::format("{}/{}", name, kind).c_str(), run, build)
-        ->Arg(325)->Arg(1300)->Arg(5200)
+        ->Arg(325)
+        ->Arg(1300)
+        ->Arg(5200)
         ->Unit(benchmark::kMillisecond)
         ->MeasureProcessCPUTime()
         ->UseRealTime();

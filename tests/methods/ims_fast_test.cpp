@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "methods/ims_scenes.h"
 #include "methods/instant_scattering/marched_light.h"
 #include "methods/instant_scattering/upsampling.h"
-#include "methods/ims_scenes.h"
 #include "methods/rendering.h"
 
 namespace virga {

@@ -18,7 +18,7 @@ namespace {
 using namespace virga::testing;
 
 RenderSession frames(const std::string& elements, int passes, const SettingValues& more = {}, uint64_t seed = 1) {
-  SettingValues settings{{"mode", "frame"}, {"spacing", "4"}};
+  SettingValues settings{{"mode", "frame"}, {"spacing", "4"}, {"walks", "2048"}};
   for (const auto& [name, value] : more) settings[name] = value;
   return rendered(sceneOf(elements),
                   {.passes = passes, .seed = seed, .layers = LayerMask::all(), .method = "ims", .settings = settings});
@@ -34,9 +34,21 @@ Image indirect(const RenderSession& session) {
   return sum;
 }
 
-/// Largest change of a pixel from one picture to another, over the picture's mean.
-double largestChange(const Image& a, const Image& b) {
-  return static_cast<double>(largestDifference(a, b)) / pixelMoments(b).mean();
+/// Changes of the pixels from one picture to another, over their own value and the picture's mean, in order.
+std::vector<double> changes(const Image& from, const Image& to) {
+  const double level = pixelMoments(from).mean();
+  std::vector<double> all;
+  for (size_t i = 0; i < from.pixels.size(); ++i) {
+    const auto a = static_cast<double>(mean(from.pixels[i])), b = static_cast<double>(mean(to.pixels[i]));
+    all.push_back(std::fabs(a - b) / (a + level));
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+double rootMeanSquare(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return std::sqrt(sum / static_cast<double>(values.size()));
 }
 
 // --- coherence ---
@@ -44,7 +56,7 @@ double largestChange(const Image& a, const Image& b) {
 TEST(ImsFrame, IsAFunctionOfItsInputForAnyNumberOfThreads) {
   const auto picture = [](const std::string& scene, size_t threads) {
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    return frames(scene, 2).film().beauty();
+    return frames(scene, 2, {{"walks", "500"}}).film().beauty();
   };
   for (const std::string& scene : {plume(24), fog(24)}) {
     const Image one = picture(scene, 1);
@@ -53,21 +65,25 @@ TEST(ImsFrame, IsAFunctionOfItsInputForAnyNumberOfThreads) {
   }
 }
 
-// The camera goes a fiftieth of a pixel's width to the side. Light that has scattered more than once must hardly change,
-// in any pixel; with other walks in each frame it does: that is what flickers.
-TEST(ImsFrame, NothingPopsWhenTheCameraMoves) {
-  const auto change = [](const auto& scene, uint64_t otherSeed) {
-    const Image before = indirect(frames(scene(0.f), 1));
-    return largestChange(indirect(frames(scene(0.002f), 1, {}, otherSeed)), before);
-  };
-  for (const auto& scene : {+[](float x) { return plume(40, x); }, +[](float x) { return fog(40, R"(<bsdf type="diffuse"/>)", x); }}) {
-    EXPECT_LT(change(scene, 1), 0.02);
-    EXPECT_GT(change(scene, 2), 0.1) << "the test cannot tell frames that flicker";
-  }
+// The camera goes a twentieth of a pixel's width to the side. The light of virtual lights must hardly change, but where
+// a silhouette or the smoke's own edge passes the middle of a pixel; with other walks in each frame it does: that is
+// what flickers.
+void expectCoherent(const std::string& before, const std::string& after) {
+  const Image first = indirect(frames(before, 1));
+  const std::vector<double> same = changes(first, indirect(frames(after, 1)));
+  const std::vector<double> fresh = changes(first, indirect(frames(after, 1, {}, 2)));
+  const size_t most = same.size() * 9 / 10;
+  EXPECT_LT(same[most], 0.005);
+  EXPECT_LT(rootMeanSquare(same), 0.5 * rootMeanSquare(fresh));
+  EXPECT_GT(fresh[most], 0.02) << "the test cannot tell frames that flicker";
+}
+TEST(ImsFrame, NothingPopsInSmokeWhenTheCameraMoves) { expectCoherent(plume(64), plume(64, 0.002f)); }
+TEST(ImsFrame, NothingPopsInFogWhenTheCameraMoves) {
+  expectCoherent(fog(64), fog(64, R"(<bsdf type="diffuse"/>)", 0.002f));
 }
 
 TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
-  const Settings settings{{{"mode", "frame"}}, 1};
+  const Settings settings{{{"mode", "frame"}, {"walks", "500"}}, 1};
   RenderSession moved(sceneOf(fog(24)), findMethod("ims"), {.settings = settings});
   moved.step();
   moved.edit(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), {{{{"camera"}, Aspect::camera}}});
@@ -79,8 +95,10 @@ TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
 
 // --- accuracy ---
 
-void expectNear(const std::string& elements, double tolerance, int passes, const SettingValues& settings = {}) {
-  const RenderSession truth = rendered(sceneOf(elements), {.passes = 400, .seed = 5, .layers = LayerMask::all()});
+void expectNear(const std::string& elements, double tolerance, int passes, const SettingValues& settings = {},
+                int truthPasses = 240) {
+  const RenderSession truth =
+      rendered(sceneOf(elements), {.passes = truthPasses, .seed = 5, .layers = LayerMask::all()});
   const RenderSession own = frames(elements, passes, settings);
   const double beauty = replicateMoments(truth.film()).mean();
   for (int l = 0; l < kLayerCount; ++l) {
@@ -89,19 +107,41 @@ void expectNear(const std::string& elements, double tolerance, int passes, const
     const double noise = 4 * std::hypot(a.standardError(), b.standardError());
     EXPECT_NEAR(a.mean(), b.mean(), tolerance * b.mean() + 2e-3 * beauty + noise)
         << kLayerNames[static_cast<size_t>(l)];
-    EXPECT_LT(noise, 0.03 * beauty) << "too few samples to tell";
+    EXPECT_LT(noise, 0.05 * beauty) << "too few samples to tell";
   }
 }
 
-TEST(ImsFrame, LayersOfAPlumeAreNearTheTruth) { expectNear(plume(32), 0.06, 16); }
+TEST(ImsFrame, LayersOfAPlumeAreNearTheTruth) {
+  expectNear(plume(48), 0.1, 8, {{"walks", "65536"}});  // few of which meet the plume
+}
 TEST(ImsFrame, LayersOfFogAreNearTheTruth) { expectNear(fog(32), 0.06, 16); }
 // Bsdfs and phase functions that the kernels do not know go by their own scattering; glass goes by paths.
 TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
   const std::string phong = R"(<bsdf type="phong"><rgb name="diffuse_reflectance" value="0.3"/>
     <rgb name="specular_reflectance" value="0.4"/><float name="exponent" value="10"/></bsdf>)";
-  expectNear(fog(24, phong), 0.06, 16);
+  expectNear(fog(24, phong), 0.06, 16, {{"lights", "300"}});
 }
-TEST(ImsFrame, GlassGoesByPaths) { expectNear(fog(24, R"(<bsdf type="dielectric"/>)"), 0.06, 16); }
+TEST(ImsFrame, GlassGoesByPaths) { expectNear(fog(16, R"(<bsdf type="dielectric"/>)"), 0.06, 16, {{"lights", "300"}}); }
+
+// Many walks, all of their lights, hardly spread, exact visibility: the frame goes to the truth.
+TEST(ImsFrame, ManyLightsGoToTheTruth) {
+  const std::string ball = pinpointSensor("0, 0, 3", "0.1, 0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)");
+  const std::string scene = R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/>
+    <float name="albedo" value="0.9"/><phase type="hg"><float name="g" value="0.4"/></phase></medium>)" +
+                            ball + R"(
+    <emitter type="point"><point name="position" x="1" y="1.5" z="1"/><rgb name="intensity" value="9"/></emitter>
+    <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="9"/><rotate x="1" angle="-90"/><translate y="-1"/>
+      </transform><bsdf type="diffuse"/></shape>)";
+  expectNear(scene, 0.02, 8,
+             {{"walks", "4096"},
+              {"lights", "100000"},
+              {"radius", "0.1"},
+              {"visibility", "exact"},
+              {"spacing", "16"},
+              {"samples", "16"}},
+             2000);
+}
 
 TEST(ImsFrame, PathsOfOneSegmentShowLampsAlone) {
   EXPECT_EQ(pixelMoments(frames(plume(16), 1, {{"max_depth", "1"}}).film().beauty()).mean(), 0);
@@ -123,7 +163,8 @@ TEST(ImsFrame, RefusesWhatItCannotDo) {
 TEST(ImsFrame, AStopLeavesNothing) {
   std::stop_source stop;
   stop.request_stop();
-  RenderSession session(sceneOf(fog(8)), findMethod("ims"), {.settings = {.values = {{"mode", "frame"}}}});
+  RenderSession session(sceneOf(fog(8)), findMethod("ims"),
+                        {.settings = {.values = {{"mode", "frame"}, {"walks", "500"}}}});
   EXPECT_FALSE(session.step({}, stop.get_token()).completed);
   EXPECT_TRUE(session.step().completed);
   EXPECT_TRUE(session.step().biased);
@@ -157,11 +198,11 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
     const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
     truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
   }
-  float t[8], r[8], g[8], b[8];
+  float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
   lightFog(lamps, ray, 0.5f, t, r, g, b);
   double sum = 0;
   for (const float v : r) sum += static_cast<double>(v);
-  EXPECT_NEAR(sum, truth, 0.01 * truth);
+  EXPECT_NEAR(sum, truth, 0.04 * truth);  // by few points
   EXPECT_EQ(b[3], 0);
 }
 
@@ -178,16 +219,16 @@ TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
 // Tables of optical depths are near those that marching finds, from lights in the plume and on the floor.
 TEST(FrameLights, TablesKnowTheMedia) {
   const SceneSnapshot scene = sceneOf(plume(8));
-  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 40}, {3, 0, 0, 0}),
-                           {.shadows = FrameLights::ShadowMapping::none}, {});
-  ASSERT_GT(lights.lights().size(), 40u);
+  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}),
+                           {.most = 200, .shadows = FrameLights::ShadowMapping::none}, {});
+  ASSERT_GT(lights.lights().size(), 100u);
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
   std::vector<float> x, y, z, none(64, 0.f), seen(64);
   for (int i = 0; i < 64; ++i)
     x.push_back(-0.9f + 0.6f * static_cast<float>(i % 4)), y.push_back(-0.9f + 0.6f * static_cast<float>(i / 4 % 4)),
         z.push_back(-0.8f + 0.6f * static_cast<float>(i / 16));
-  const KernelReceivers to{64, x.data(), y.data(), z.data(), none.data(), none.data(), none.data(), none.data(),
-                           none.data(), none.data(), none.data()};
+  const KernelReceivers to{64,          x.data(),    y.data(),    z.data(),    none.data(), none.data(),
+                           none.data(), none.data(), none.data(), none.data(), none.data()};
   double error = 0, sum = 0;
   for (size_t l = 0; l < lights.lights().size(); ++l) {
     float* out[3] = {seen.data(), seen.data(), seen.data()};

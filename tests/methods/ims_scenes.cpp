@@ -22,8 +22,7 @@ std::string sensor(int size, float x) {
 
 /// A volume on disk for as long as the tests run.
 struct SmokeFile {
-  std::filesystem::path path =
-      std::filesystem::temp_directory_path() / fmt::format("virga_ims.{}.vol", ::getpid());
+  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("virga_ims.{}.vol", ::getpid());
   SmokeFile() { writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 48})); }
   ~SmokeFile() { std::filesystem::remove(path); }
 };
@@ -41,7 +40,7 @@ std::string plume(int size, float x) {
       <medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
         <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
         <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium></shape>)",
-                                    file.path.string());
+                                       file.path.string());
 }
 
 std::string fog(int size, const std::string& bsdf, float x) {

@@ -67,6 +67,9 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   return true;
 }
 
+/// Of an optical depth. Mostly it is grey, and one exponential does.
+VIRGA_HD inline Rgb transmittanceOf(Rgb depth) { return isGrey(depth) ? Rgb(std::exp(-depth.r)) : exp(depth * -1); }
+
 /// Transmittance along a ray by marching; null boundaries are passed, surfaces are not looked at.
 template <class Rays>
 VIRGA_HD Rgb marchedTransmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, int steps,
@@ -78,7 +81,7 @@ VIRGA_HD Rgb marchedTransmittance(const SceneView& scene, const Rays& rays, Medi
       return true;
     });
   });
-  return exp(depth * -1);
+  return transmittanceOf(depth);
 }
 
 /// An eye ray: the media that it passes, by marching, and the surface that it meets.
@@ -125,7 +128,7 @@ struct MarchedEye {
       const float here = clamp((reached - mean(before)) / mean(own), 0, 1);
       // The density is that of the mean channel.
       const Rgb passed = before + own * here;
-      const Rgb weight = own * exp(passed * -1) * (seen / (mean(own) * std::exp(-mean(passed))));
+      const Rgb weight = own * transmittanceOf(passed) * (seen / (mean(own) * std::exp(-mean(passed))));
       visit(k, at.ray.at(lerp(s.t0, s.t1, here)), weight, media[s.stretch]);
     }
   }
@@ -148,11 +151,8 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
     if (kept) eye.media[eye.stretches] = eye.at.media;
     marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, MarchedEye::kSteps, shift, [&](float a, float b, Rgb here) {
       if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))
-        eye.step[eye.steps++] = {a,
-                                 b,
-                                 {eye.depth.r, eye.depth.g, eye.depth.b},
-                                 {here.r, here.g, here.b},
-                                 eye.stretches};
+        eye.step[eye.steps++] = {
+            a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
       eye.depth += here;
       return true;
     });

@@ -9,9 +9,9 @@
 
 namespace virga {
 
-/// `ims.mode=frame` (section 5 of the paper): few walks, all of whose virtual lights light every coarse pixel. A pass is
-/// a function of (scene, camera, settings, number of the pass): nothing is drawn by chance in a pixel, and the walks stay
-/// the same when the camera moves. Passes are averaged: each has other walks and other fixed points.
+/// `ims.mode=frame` (section 5 of the paper): few walks, all of whose virtual lights light every coarse pixel. A pass
+/// is a function of (scene, camera, settings, number of the pass): nothing is drawn by chance in a pixel, and the walks
+/// stay the same when the camera moves. Passes are averaged: each has other walks and other fixed points.
 class FrameRenderer {
  public:
   /// What an edit has changed is forgotten.

@@ -7,9 +7,9 @@
 
 namespace virga {
 
-// What a frame (`ims.mode=frame`) spends its time on: every virtual light lights every receiver. Plain loops over arrays;
-// the functions at the end run them. They are compiled with -ffast-math, all of this has internal linkage, and nothing
-// here may meet a NaN.
+// What a frame (`ims.mode=frame`) spends its time on: every virtual light lights every receiver. Plain loops over
+// arrays; the functions at the end run them. They are compiled with -ffast-math, all of this has internal linkage, and
+// nothing here may meet a NaN.
 
 /// A virtual light: Lambertian on a surface, or in a medium.
 struct KernelLight {
@@ -41,12 +41,12 @@ struct NearField {
   float bound = 1;  ///< [1/unit^2]
 };
 
-/// Where a table of optical depths looks from a point: all around or, from outside of the media, into the cone that they
-/// fill. Between two distances, radii whose steps grow, so that they are densest near the point.
+/// Where a table of optical depths looks from a point: all around or, from outside of the media, into the cone that
+/// they fill. Between two distances, radii whose steps grow, so that they are densest near the point.
 struct DepthView {
   float ux, uy, uz, vx, vy, vz, wx, wy, wz;  ///< an orthonormal frame, w along the cone
-  float stretch;                             ///< 2 / (1 - cosine of the cone's half angle): 1 - cosine is stretched by it
-  float first, last;                         ///< [unit] there are no media before and beyond
+  float stretch;      ///< 2 / (1 - cosine of the cone's half angle): 1 - cosine is stretched by it
+  float first, last;  ///< [unit] there are no media before and beyond
 };
 
 /// Optical depths at directions and distances: nodes of an octahedral map of the stretched directions, and radii.
@@ -69,9 +69,10 @@ struct KernelShadowMap {
 
 /// Fixed points of lamps, each of which lights one point of a ray through fog.
 struct FogLamps {
-  static constexpr int kCount = 8;
+  static constexpr int kCount = 4;
 
-  bool known[kCount] = {};  ///< others are left to somebody else
+  bool known[kCount] = {};  ///< there is one
+  bool alone = true;        ///< there are no lamps of other kinds
   float px[kCount] = {}, py[kCount] = {}, pz[kCount] = {};
   float nx[kCount] = {}, ny[kCount] = {}, nz[kCount] = {};  ///< normal; 0 where it sends to all sides alike
   float all[kCount] = {};                                   ///< 1 where it does, otherwise 0
@@ -196,9 +197,10 @@ VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelR
     octahedral(a * turned, b * turned, c, u, v);
     u = (u + 1) * (0.5f * (kSide - 1)), v = (v + 1) * (0.5f * (kSide - 1));
     const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), kRadii - 1.001f);
-    const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)), row = static_cast<int>(std::fmin(v, kSide - 1.001f)),
-              radius = static_cast<int>(m);
-    const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row), fm = m - static_cast<float>(radius);
+    const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)),
+              row = static_cast<int>(std::fmin(v, kSide - 1.001f)), radius = static_cast<int>(m);
+    const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row),
+                fm = m - static_cast<float>(radius);
     const int at = (row * kSide + column) * kRadii + radius;
     const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
     const float d01 = depth[at + kRadii] * (1 - fm) + depth[at + kRadii + 1] * fm;
@@ -208,8 +210,8 @@ VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelR
   }
 }
 
-/// atan2 of y >= 0 (Abramowitz and Stegun 1964, 4.4.49: error 1e-5), and sine and cosine of an angle in [0, pi] by their
-/// series about pi / 2 (4e-6): the compiler has no vector code for those of the library.
+/// atan2 of y >= 0 (Abramowitz and Stegun 1964, 4.4.49: error 1e-5), and sine and cosine of an angle in [0, pi] by
+/// their series about pi / 2 (4e-6): the compiler has no vector code for those of the library.
 VIRGA_HD static inline float angleOf(float y, float x) {
   const float ax = std::fabs(x), least = y < ax ? y : ax, most = y < ax ? ax : y;
   const float q = least / (most + 1e-30f), q2 = q * q;
@@ -246,9 +248,10 @@ VIRGA_HD static inline void lightFog(const FogLamps& lamps, const FogRay& ray, f
     const float at = std::fmin(std::fmax(along, 0.f), whole);
     const float from = start + at, d2 = height * height + from * from, inverse = 1 / std::sqrt(d2);
     // 1 / d^2 and the density height / (range d^2) cancel.
-    const float cosine = lamps.all[k] + std::fmax(0.f, (lamps.nx[k] * (ray.dx * from - ex) + lamps.ny[k] * (ray.dy * from - ey) +
-                                                        lamps.nz[k] * (ray.dz * from - ez)) *
-                                                           inverse);
+    const float cosine =
+        lamps.all[k] + std::fmax(0.f, (lamps.nx[k] * (ray.dx * from - ex) + lamps.ny[k] * (ray.dy * from - ey) +
+                                       lamps.nz[k] * (ray.dz * from - ez)) *
+                                          inverse);
     const float g2 = ray.anisotropy, toward = from * inverse;  // dot(wo, wi): wo = -d, wi = (y - p) / |y - p|
     const float q = 1 + g2 * g2 + 2 * g2 * toward;
     const float value = kInverse4Pi * (1 - g2 * g2) / (q * std::sqrt(q)) * cosine * range / height;

@@ -24,7 +24,8 @@ Vec3 nodeDirection(const DepthView& f, int column, int row) {
   const auto place = [](int n) { return 2 * static_cast<float>(n) / (DepthTable::kSide - 1) - 1; };
   const Vec3 stretched = fromOctahedron({place(column), place(row)});
   const float c = 1 - (1 - stretched.z) / f.stretch;
-  const float turned = std::sqrt(std::max(0.f, 1 - c * c) / std::max(1e-20f, square(stretched.x) + square(stretched.y)));
+  const float turned =
+      std::sqrt(std::max(0.f, 1 - c * c) / std::max(1e-20f, square(stretched.x) + square(stretched.y)));
   return Vec3(f.ux, f.uy, f.uz) * (stretched.x * turned) + Vec3(f.vx, f.vy, f.vz) * (stretched.y * turned) +
          Vec3(f.wx, f.wy, f.wz) * c;
 }
@@ -78,9 +79,8 @@ DepthView viewOf(const Bounds& media, Vec3 p) {
 
 /// Everything outside the surfaces is in the same media: the camera's.
 bool sameMediaEverywhere(const SceneView& view) {
-  return view.boundaries.size == 0 && std::none_of(view.surfaces.begin(), view.surfaces.end(), [](const ShapeView& s) {
-           return s.media.declared();
-         });
+  return view.boundaries.size == 0 && std::none_of(view.surfaces.begin(), view.surfaces.end(),
+                                                   [](const ShapeView& s) { return s.media.declared(); });
 }
 
 /// Adds to depth[m] the optical depth between the radii m - 1 and m of a table.
@@ -176,7 +176,8 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   const auto most = static_cast<size_t>(options.most);
   const size_t surfaceShare = std::max(most / 2, most - std::min(most, inMedia.size()));
   onSurfaces = thinned(std::move(onSurfaces), surfaceShare, options.turn);
-  inMedia = thinned(std::move(inMedia), std::max<size_t>(1, most - std::min(most - 1, onSurfaces.size())), options.turn);
+  inMedia =
+      thinned(std::move(inMedia), std::max<size_t>(1, most - std::min(most - 1, onSurfaces.size())), options.turn);
   lights_ = std::move(onSurfaces);
   lights_.insert(lights_.end(), inMedia.begin(), inMedia.end());
   if (options.shadows == ShadowMapping::maps) makeMaps(scene, stop);

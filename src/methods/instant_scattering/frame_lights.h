@@ -54,11 +54,11 @@ class FrameLights {
   VirtualLights virtualLights_;
   std::vector<Light> lights_;
   Between between_ = Between::nothing;
-  Rgb fog_;                   ///< extinction of the homogeneous medium that is everywhere [1/unit]
-  int channels_ = 1;          ///< that differ
-  std::vector<float> depth_;  ///< tables of the first light, channel by channel, of the second...
+  Rgb fog_;                       ///< extinction of the homogeneous medium that is everywhere [1/unit]
+  int channels_ = 1;              ///< that differ
+  std::vector<float> depth_;      ///< tables of the first light, channel by channel, of the second...
   std::vector<DepthView> views_;  ///< of each light's tables
-  std::vector<float> maps_;   ///< shadow maps of the lights; empty: there are none
+  std::vector<float> maps_;       ///< shadow maps of the lights; empty: there are none
 };
 
 /// How the kernels know a phase function, and its g; false if they do not.

@@ -30,8 +30,7 @@ void FramePixels::visitReceivers(const MarchedEye& eye, Visit&& visit) const {
       visit(std::move(r));
     }
   });
-  if (eye.hit.found())
-    visit({Vertex::onSurface(eye.point, eye.side, wo, eye.at.media), exp(eye.depth * -1)});
+  if (eye.hit.found()) visit({Vertex::onSurface(eye.point, eye.side, wo, eye.at.media), transmittanceOf(eye.depth)});
 }
 
 std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<const Pixel> pixels) const {

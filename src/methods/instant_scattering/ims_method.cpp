@@ -31,7 +31,8 @@ class ImsMethod final : public Method {
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const ImsOptions options = settings_.forScene(*scene_);
     if (options.mode == ImsOptions::Mode::frame) {
-      const bool completed = renderer_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
+      const bool completed =
+          renderer_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
       if (renderer_.lights()) overlay_ = dotsOf(renderer_.lights()->virtualLights());
       return {.completed = completed, .biased = true};
     }
@@ -122,7 +123,7 @@ class ImsMethod final : public Method {
 
   SceneSnapshot scene_;
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
-  FrameRenderer renderer_;  ///< likewise, for frames
+  FrameRenderer renderer_;                  ///< likewise, for frames
   Overlay overlay_;
   ImsSettings settings_;
   uint64_t seed_ = 0;

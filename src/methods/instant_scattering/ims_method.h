@@ -7,15 +7,19 @@ namespace virga {
 
 inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
-     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing is "
+     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing "
+     "is "
      "drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
-    {"samples", "16; frame: 8", "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
+    {"samples", "16; frame: 8",
+     "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
     {"walks", "8192; frame: 16384", "random walks from the lights in each pass"},
     {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
-     "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of all"},
+     "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of "
+     "all"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},
-    {"radius", "0.3 times the scene's extent, or, without shapes, the mean free path; frame: twice the spacing of its lights",
+    {"radius",
+     "0.3 times the scene's extent, or, without shapes, the mean free path; frame: twice the spacing of its lights",
      "virtual lights that are nearer are clamped, and what that takes is compensated [unit]"},
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
     {"compensation", "path; frame: spread",
@@ -28,7 +32,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"p1", "0", "sampled: walks that light a vertex of the first level (P_1); 0: single lights"},
     {"p2", "0", "sampled: walks that light a vertex of further levels (P_2); 0: single lights"},
     {"transmittance", "exact", "sampled: to the new vertices: exact, or from the local mean of the medium (biased)"},
-    {"visibility", "exact; frame: maps", "of virtual lights: exact, none (biased), or frame: from shadow maps (biased)"},
+    {"visibility", "exact; frame: maps",
+     "of virtual lights: exact, none (biased), or frame: from shadow maps (biased)"},
     {"show", "picture", "picture; lost: only what clamping takes; compensation: only what is found again"},
     {"max_depth", "the scene's", "longest path in segments, -1 for no limit; 2 is direct light"},
     {"rr_depth", "the scene's", "scattering events of the eye path before Russian roulette by throughput begins"},

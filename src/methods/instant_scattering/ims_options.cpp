@@ -61,9 +61,11 @@ ImsSettings::ImsSettings(const Settings& settings) {
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
   o.samples = reader.integer("samples", 1).value_or(isFrame ? kFramePoints : o.samples);
-  o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
+  o.compensate =
+      static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
-  o.frame.visibility = static_cast<ReceiverBatch::Visibility>(reader.choice("visibility", kVisibility).value_or(isFrame ? 2 : 0));
+  o.frame.visibility =
+      static_cast<ReceiverBatch::Visibility>(reader.choice("visibility", kVisibility).value_or(isFrame ? 2 : 0));
   o.gather.visibility = o.frame.visibility != ReceiverBatch::Visibility::none;
   if (!isFrame && o.frame.visibility == ReceiverBatch::Visibility::maps)
     throw Error("--set ims.visibility=maps needs ims.mode=frame");

@@ -9,8 +9,8 @@ namespace virga {
 
 /// What MarchedLight asks for, drawn anew in each sample (`fast`).
 struct RandomNumbers {
-  static constexpr int kPoints = 4;           ///< on the eye ray that are lit
-  static constexpr int kSurfaceLamps = 1;     ///< points on lamps that light the surface
+  static constexpr int kPoints = 4;        ///< on the eye ray that are lit
+  static constexpr int kSurfaceLamps = 1;  ///< points on lamps that light the surface
 
   Sampler& sampler;
 
@@ -29,7 +29,7 @@ struct RandomNumbers {
 /// The same in every pixel (`frame`): points of an even set, turned by a number of the pass. Nothing shimmers; what an
 /// even set gets wrong changes slowly from pixel to pixel.
 struct FixedNumbers {
-  static constexpr int kPoints = FogLamps::kCount;
+  static constexpr int kPoints = 8;
   static constexpr int kSurfaceLamps = 4;
 
   uint32_t pass;
@@ -40,10 +40,11 @@ struct FixedNumbers {
   /// Van der Corput's sequence chooses the lamp, the additive one of the plastic number the place on it.
   VIRGA_HD RandomNumbers::Lamp lamp(int k, int count) const {
     const auto n = static_cast<float>(k);
-    const float choice = count == 1 ? 0.5f : toUnitFloat(reverseBits(static_cast<uint32_t>(k))) + 0.5f / static_cast<float>(count);
-    return {turned(choice, 0.4142136f), {turned(0.5f + n * 0.7548777f, 0.7320508f), turned(0.5f + n * 0.5698403f, 0.2360680f)}};
+    const float choice =
+        count == 1 ? 0.5f : toUnitFloat(reverseBits(static_cast<uint32_t>(k))) + 0.5f / static_cast<float>(count);
+    return {turned(choice, 0.4142136f),
+            {turned(0.5f + n * 0.7548777f, 0.7320508f), turned(0.5f + n * 0.5698403f, 0.2360680f)}};
   }
-
 
  private:
   VIRGA_HD float turned(float x, float by) const {
@@ -51,6 +52,11 @@ struct FixedNumbers {
     return std::fmin(y - std::floor(y), 0x1.fffffep-1f);
   }
 };
+
+/// Fog is lit by points of these lamps, and by angle as seen from them: FogLamps.
+VIRGA_HD inline bool isAimedAt(const EmitterView& e) {
+  return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::area;
+}
 
 struct LampChoice {
   int index;
@@ -87,12 +93,11 @@ class MarchedLight {
   template <class Numbers>
   VIRGA_HD void add(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     lightMedia(eye, radiance, numbers);
-    const Rgb through = exp(eye.depth * -1);
+    const Rgb through = transmittanceOf(eye.depth);
     if (eye.hit.found())
       lightSurface(eye, through, radiance, numbers);
     else if (scene_.environment >= 0)
-      radiance.add(Layer::emission,
-                   through * environmentRadiance(scene_.emitters[scene_.environment], eye.at.ray.d));
+      radiance.add(Layer::emission, through * environmentRadiance(scene_.emitters[scene_.environment], eye.at.ray.d));
   }
 
  private:
@@ -102,12 +107,14 @@ class MarchedLight {
     const float share = 1.f / Numbers::kPoints;
     const bool inFog = lamps_ && isFog(eye);
     if (inFog) lightFogOf(eye, shift, radiance, numbers);
+    if (inFog && lamps_->alone) return;
     eye.visitPoints(Numbers::kPoints, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
-      if (inFog && lamps_->known[k]) return;
       const auto drawn = numbers.lamp(k, Numbers::kPoints);
       const LampChoice lamp = chooseLamp(scene_, drawn.choice);
       if (!(lamp.probability > 0)) return;
-      const LightSample light = sampleLight(scene_, scene_.emitters[lamp.index], p, drawn.u);
+      const EmitterView& emitter = scene_.emitters[lamp.index];
+      if (inFog && isAimedAt(emitter)) return;
+      const LightSample light = sampleLight(scene_, emitter, p, drawn.u);
       const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, light, numbers);
       radiance.add(Layer::directMedia, found * (share / lamp.probability));
     });
@@ -141,8 +148,10 @@ class MarchedLight {
     const Ray& ray = eye.at.ray;
     const Rgb sigmaT = medium.spectrum * medium.sigmaT;
     const auto* hg = medium.phase.get<HenyeyGreenstein>();
-    const FogRay fog{ray.o.x, ray.o.y, ray.o.z, ray.d.x, ray.d.y, ray.d.z, eye.step[0].t0, eye.step[0].t1,
-                     {sigmaT.r, sigmaT.g, sigmaT.b}, hg ? hg->g : 0};
+    const FogRay fog{ray.o.x,        ray.o.y,        ray.o.z,
+                     ray.d.x,        ray.d.y,        ray.d.z,
+                     eye.step[0].t0, eye.step[0].t1, {sigmaT.r, sigmaT.g, sigmaT.b},
+                     hg ? hg->g : 0};
     float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
     lightFog(*lamps_, fog, shift, t, r, g, b);
     for (int k = 0; k < FogLamps::kCount; ++k) {
@@ -199,15 +208,16 @@ class MarchedLight {
   const FogLamps* lamps_;
 };
 
-/// The points on lamps that `numbers` choose, as far as they are at a finite distance and send as kernels know it.
+/// The points on lamps that `numbers` choose, of those that isAimedAt().
 inline FogLamps fogLamps(const SceneView& scene, const FixedNumbers& numbers) {
   FogLamps lamps;
+  lamps.alone = std::all_of(scene.emitters.begin(), scene.emitters.end(), isAimedAt);
   for (int k = 0; k < FogLamps::kCount; ++k) {
     const auto drawn = numbers.lamp(k, FogLamps::kCount);
     const LampChoice lamp = chooseLamp(scene, drawn.choice);
     if (!(lamp.probability > 0)) continue;
     const EmitterView& emitter = scene.emitters[lamp.index];
-    if (emitter.kind != EmitterView::Kind::point && emitter.kind != EmitterView::Kind::area) continue;
+    if (!isAimedAt(emitter)) continue;
     const LightPoint on = sampleLightPoint(scene, emitter, drawn.u);
     if (!(on.areaPdf > 0)) continue;
     const Rgb sent = (on.pointLike ? emitter.value : emitter.radianceAt(on.uv)) /

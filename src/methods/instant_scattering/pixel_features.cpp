@@ -39,7 +39,7 @@ PixelFeatures pixelFeatures(const MarchedEye& eye) {
   PixelFeatures f;
   f.regular = true;
   f.depth = eye.hit.found() ? eye.hit.t : kInfinity;
-  const Rgb transmittance = exp(eye.depth * -1);
+  const Rgb transmittance = transmittanceOf(eye.depth);
   f.opacity = Rgb(1.f) - transmittance;
   f.mediaDepth = meanDepth(eye);
   if (!eye.hit.found()) return f;

@@ -20,8 +20,8 @@ bool unobstructed(const SceneView& scene, const EmbreeRays& rays, const Vertex& 
 }  // namespace
 
 KernelReceivers ReceiverBatch::Group::view() {
-  return {static_cast<int>(px.size()), px.data(), py.data(),         pz.data(),     ax.data(),     ay.data(),
-          az.data(),                   anisotropy.data(), sum[0].data(), sum[1].data(), sum[2].data()};
+  return {static_cast<int>(px.size()), px.data(),     py.data(),     pz.data(),    ax.data(), ay.data(), az.data(),
+          anisotropy.data(),           sum[0].data(), sum[1].data(), sum[2].data()};
 }
 
 void ReceiverBatch::Group::clearSums() {
@@ -57,8 +57,7 @@ void ReceiverBatch::add(const SceneView& scene, const Receiver& receiver) {
   if (plain) group.receivers.back().throughput *= scattered;
 }
 
-void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const Options& options,
-                           const Found& found) {
+void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const Options& options, const Found& found) {
   size_t i = 0;
   for (const VertexKind kind : {VertexKind::surface, VertexKind::medium}) {
     for (Group& group : groups_) group.clearSums();

@@ -48,8 +48,8 @@ class ReceiverBatch {
   static float plainScattering(const Group& group, size_t n, Vec3 w);
   static void look(const Scene& scene, const FrameLights& lights, size_t i, Group& group, const Options& options,
                    float* seen[3]);
-  static void gatherSlowly(const FrameLights& lights, size_t i, const SceneView& scene, Group& group, const NearField& near,
-                           float* const seen[3]);
+  static void gatherSlowly(const FrameLights& lights, size_t i, const SceneView& scene, Group& group,
+                           const NearField& near, float* const seen[3]);
   static void distribute(const Group& group, VertexKind lights, const Found& found);
 
   static constexpr int kGroups = 4;  ///< one for each EndKind, and the last for what is not plain
