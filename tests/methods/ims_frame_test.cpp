@@ -107,7 +107,7 @@ void expectNear(const std::string& elements, double tolerance, int passes, const
     const double noise = 4 * std::hypot(a.standardError(), b.standardError());
     EXPECT_NEAR(a.mean(), b.mean(), tolerance * b.mean() + 2e-3 * beauty + noise)
         << kLayerNames[static_cast<size_t>(l)];
-    EXPECT_LT(noise, 0.05 * beauty) << "too few samples to tell";
+    EXPECT_LT(noise, 0.07 * beauty) << "too few samples to tell";
   }
 }
 
@@ -140,7 +140,7 @@ TEST(ImsFrame, ManyLightsGoToTheTruth) {
               {"visibility", "exact"},
               {"spacing", "16"},
               {"samples", "16"}},
-             2000);
+             5000);
 }
 
 TEST(ImsFrame, PathsOfOneSegmentShowLampsAlone) {
@@ -199,11 +199,14 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
     truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
   }
   float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
-  lightFog(lamps, ray, 0.5f, t, r, g, b);
+  constexpr int kShifts = 16;
   double sum = 0;
-  for (const float v : r) sum += static_cast<double>(v);
-  EXPECT_NEAR(sum, truth, 0.04 * truth);  // by few points
-  EXPECT_EQ(b[3], 0);
+  for (int shift = 0; shift < kShifts; ++shift) {
+    lightFog(lamps, ray, (static_cast<float>(shift) + 0.5f) / kShifts, t, r, g, b);
+    for (const float v : r) sum += static_cast<double>(v) / kShifts;
+    EXPECT_NEAR(b[0], 0, 0);
+  }
+  EXPECT_NEAR(sum, truth, 2e-3 * truth);
 }
 
 TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
