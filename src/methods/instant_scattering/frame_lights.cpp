@@ -52,7 +52,8 @@ Bounds boundsOfMedia(const Scene& scene, const std::vector<FrameLights::Light>& 
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
   const int endless = endlessMedium(scene);
   const DepthView around{1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1};
-  const float most = 2 * length(scene.view.bounds.extent());
+  // Media without end, and no shapes among them: as far as may matter.
+  const float most = scene.view.bounds.empty() ? 1e3f : 2 * length(scene.view.bounds.extent());
   Bounds media;
   for (size_t i = 0; i < lights.size(); i += std::max<size_t>(1, lights.size() / kMost)) {
     const Vec3 p = aside(lights[i], scene.view);
@@ -72,7 +73,7 @@ DepthView viewOf(const Bounds& media, Vec3 p) {
   const float radius = 0.5f * length(media.extent()), d = length(way);
   if (!(d > 1.001f * radius)) return {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, d + radius};
   const Frame frame(way / d);
-  const float height = square(radius / d) / (1 + std::sqrt(1 - square(radius / d)));  // 1 - cosine
+  const float height = std::max(1e-7f, square(radius / d) / (1 + std::sqrt(1 - square(radius / d))));  // 1 - cosine
   return {frame.s.x, frame.s.y, frame.s.z, frame.t.x,  frame.t.y,  frame.t.z,
           frame.n.x, frame.n.y, frame.n.z, 2 / height, d - radius, d + radius};
 }
