@@ -76,6 +76,7 @@ template <class Rays>
 class MarchedLight {
  public:
   static constexpr int kLightSteps = 24;  ///< toward a lamp
+  static constexpr int kFogPoints = 24;   ///< on the eye ray that are lit by lamps at infinity, with FogLamps
 
   /// `lamps`: points in fog are lit by these, wherever they are known; null: by none.
   VIRGA_HD MarchedLight(const SceneView& scene, const Rays& rays, const FogLamps* lamps = nullptr)
@@ -104,12 +105,14 @@ class MarchedLight {
   template <class Numbers>
   VIRGA_HD void lightMedia(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     const float shift = numbers.shift();
-    const float share = 1.f / Numbers::kPoints;
     const bool inFog = lamps_ && isFog(eye);
+    // The shafts of lamps at infinity end at these points: in fog, where nothing hides that, there are more of them.
+    const int points = inFog ? kFogPoints : Numbers::kPoints;
+    const float share = 1 / static_cast<float>(points);
     if (inFog) lightFogOf(eye, shift, radiance, numbers);
     if (inFog && lamps_->alone) return;
-    eye.visitPoints(Numbers::kPoints, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
-      const auto drawn = numbers.lamp(k, Numbers::kPoints);
+    eye.visitPoints(points, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
+      const auto drawn = numbers.lamp(k, points);
       const LampChoice lamp = chooseLamp(scene_, drawn.choice);
       if (!(lamp.probability > 0)) return;
       const EmitterView& emitter = scene_.emitters[lamp.index];
