@@ -108,7 +108,7 @@ void expectNear(const std::string& elements, double tolerance, int passes, const
     EXPECT_NEAR(a.mean(), b.mean(), tolerance * b.mean() + 2e-3 * beauty + noise)
         << kLayerNames[static_cast<size_t>(l)];
     EXPECT_LT(noise, 0.1 * beauty) << kLayerNames[static_cast<size_t>(l)] << ": too few samples to tell ("
-                                    << a.standardError() << ", " << b.standardError() << ")";
+                                   << a.standardError() << ", " << b.standardError() << ")";
   }
 }
 
