@@ -7,9 +7,7 @@
 #include "transport/emitted_ray.h"
 
 namespace virga {
-namespace {
 
-// A medium that the sensor declares and in whose shape it does not lie has no end: it is around everything.
 int endlessMedium(const Scene& scene) {
   const int declared = scene.view.cameraMedia.base();
   if (declared == MediaState::kNone) return declared;
@@ -18,6 +16,8 @@ int endlessMedium(const Scene& scene) {
     if (around.medium(i) == declared) return MediaState::kNone;
   return declared;
 }
+
+namespace {
 
 // Walks are traced in blocks, each into a list of its own; the lists are joined in order.
 constexpr int kBlock = 64;

@@ -18,6 +18,14 @@ struct VirtualLights {
   int walks() const { return static_cast<int>(firstOf.size()) - 1; }
 };
 
+/// Intensity of one of them toward w, the cosine at a surface left out [W/sr].
+VIRGA_HD inline Rgb intensity(const VirtualLights& lights, const SceneView& scene, const LightVertex& light, Vec3 w) {
+  if (light.kind == VertexKind::surface && light.surface < 0) return dot(w, light.normal) > 0 ? light.weight : Rgb();
+  if (light.kind == VertexKind::surface)
+    return light.weight * lights.surfaces[static_cast<size_t>(light.surface)].scattering(w, light.wi);
+  return light.weight * scene.media[light.medium].phaseAt(light.p).value(w, light.wi);
+}
+
 struct WalkOptions {
   int walks = 1024;
   int maxDepth = -1;  ///< scattering events; -1: no limit
@@ -30,6 +38,10 @@ struct WalkOptions {
 /// stop leaves walks out.
 VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
                                  const std::stop_token& stop = {});
+
+/// Index of the medium that is around everything: one that the sensor declares and in whose shape it does not lie;
+/// MediaState::kNone where there is none.
+int endlessMedium(const Scene& scene);
 
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
 class WalkStarts {

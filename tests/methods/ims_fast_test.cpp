@@ -4,72 +4,16 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
-#include <filesystem>
-
+#include "methods/ims_scenes.h"
 #include "methods/instant_scattering/marched_light.h"
 #include "methods/instant_scattering/upsampling.h"
 #include "methods/rendering.h"
-#include "volume/procedural.h"
-#include "volume/volume_io.h"
 
 namespace virga {
 namespace {
 
 using namespace virga::testing;
-
-std::string sensor(int size) {
-  return fmt::format(R"(<sensor type="perspective"><float name="fov" value="40"/>
-    <transform name="to_world"><lookat origin="0, 0.3, 5" target="0, -0.1, 0" up="0, 1, 0"/></transform>
-    <film type="hdrfilm"><integer name="width" value="{0}"/><integer name="height" value="{0}"/><rfilter type="box"/></film>
-    </sensor>)",
-                     size);
-}
-
-/// A volume on disk for as long as the tests run.
-struct SmokeFile {
-  std::filesystem::path path =
-      std::filesystem::temp_directory_path() / fmt::format("virga_ims_fast.{}.vol", ::getpid());
-  SmokeFile() { writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 48})); }
-  ~SmokeFile() { std::filesystem::remove(path); }
-};
-
-/// A plume over a floor, beside a block, under a point light.
-std::string plume(int size) {
-  static const SmokeFile file;
-  return sensor(size) + fmt::format(R"(
-    <emitter type="point"><point name="position" x="-2.5" y="3" z="1.5"/><rgb name="intensity" value="50"/></emitter>
-    <shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="-90"/><translate y="-1"/></transform>
-      <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf></shape>
-    <shape type="cube"><transform name="to_world"><scale value="0.3"/><translate x="1.2" y="-0.7" z="0.6"/></transform></shape>
-    <shape type="cube"><transform name="to_world"><scale value="0.95"/></transform><bsdf type="null"/>
-      <medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
-        <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
-        <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium></shape>)",
-                                    file.path.string());
-}
-
-/// Fog in a room with a lamp on the ceiling and a ball of `bsdf`.
-std::string fog(int size, const std::string& bsdf = R"(<bsdf type="diffuse"/>)") {
-  const auto wall = [](const char* turn, const char* color) {
-    return fmt::format(R"(<shape type="rectangle"><transform name="to_world"><scale value="2"/><translate z="-2"/>{}
-      </transform><bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="{}"/></bsdf></bsdf></shape>)",
-                       turn, color);
-  };
-  return sensor(size) + wall("", "0.7, 0.7, 0.7") + wall(R"(<rotate x="1" angle="90"/>)", "0.7, 0.7, 0.7") +
-         wall(R"(<rotate x="1" angle="-90"/>)", "0.7, 0.7, 0.7") +
-         wall(R"(<rotate y="1" angle="90"/>)", "0.6, 0.1, 0.1") +
-         wall(R"(<rotate y="1" angle="-90"/>)", "0.1, 0.5, 0.1") +
-         fmt::format(
-             R"(<shape type="rectangle"><transform name="to_world"><scale value="0.5"/><rotate x="1" angle="90"/>
-      <translate y="1.98"/></transform><emitter type="area"><rgb name="radiance" value="8"/></emitter></shape>
-      <shape type="sphere"><float name="radius" value="0.6"/><point name="center" x="0.6" y="-1" z="0.4"/>{}</shape>
-      <shape type="cube"><transform name="to_world"><scale value="1.9"/></transform><bsdf type="null"/>
-      <medium name="interior" type="homogeneous"><float name="sigma_t" value="0.4"/><float name="albedo" value="0.9"/>
-      </medium></shape>)",
-             bsdf);
-}
 
 RenderSession fast(const std::string& elements, int passes, int spacing = 4) {
   return rendered(sceneOf(elements), {.passes = passes,

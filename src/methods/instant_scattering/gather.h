@@ -88,19 +88,12 @@ class Gatherer {
     // The vertex's own cosine is in its scattering: for shading normals it differs from that of the geometry.
     const float lost = clampedShareOf(g, bound);
     const float clamped = cosine / d2 * (options_.lostLight ? lost : 1 - lost);
-    const Rgb value = at.throughput * x.scattering(w) * emitted(light, -w) * clamped;
+    const Rgb value = at.throughput * x.scattering(w) * intensity(lights_, scene_, light, -w) * clamped;
     if (isBlack(value)) return {};
     ConnectingRay ray = aimAt(scene_, x.leave(scene_, w), light.p);
     if (visibility_.blocked(rays_, ray, x, w, d, index)) return {};
     visibility_.learn(known, light, index, w, d);
     return value * passMedia(scene_, rays_, ray.at, ray.tMax, sampler.stream());
-  }
-  /// Intensity toward w, the cosine at a surface left out [W/sr].
-  VIRGA_HD Rgb emitted(const LightVertex& light, Vec3 w) const {
-    if (light.kind == VertexKind::surface && light.surface < 0) return dot(w, light.normal) > 0 ? light.weight : Rgb();
-    if (light.kind == VertexKind::surface)
-      return light.weight * lights_.surfaces[static_cast<size_t>(light.surface)].scattering(w, light.wi);
-    return light.weight * scene_.media[light.medium].phaseAt(light.p).value(w, light.wi);
   }
 
   const SceneView& scene_;

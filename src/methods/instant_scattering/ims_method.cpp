@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/ims_method.h"
 
-#include "methods/instant_scattering/ims_pixels.h"
-#include "methods/instant_scattering/upsampling.h"
-#include "methods/pixels.h"
+#include "methods/instant_scattering/frame.h"
 
 namespace virga {
 namespace {
@@ -21,6 +19,7 @@ class ImsMethod final : public Method {
     scene_ = std::move(next);
     upsampling_ = nullptr;
     points_ = {};
+    renderer_.forget(changes);
     refuse();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
@@ -32,6 +31,12 @@ class ImsMethod final : public Method {
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const ImsOptions options = settings_.forScene(*scene_);
+    if (options.mode == ImsOptions::Mode::frame) {
+      const bool completed =
+          renderer_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
+      if (renderer_.lights()) overlay_ = dotsOf(renderer_.lights()->virtualLights());
+      return {.completed = completed, .biased = true};
+    }
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const VirtualLights lights = traceVirtualLights(
@@ -125,6 +130,7 @@ class ImsMethod final : public Method {
   SceneSnapshot scene_;
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
   SurfacePoints points_;                    ///< likewise
+  FrameRenderer renderer_;                  ///< likewise, for frames
   Overlay overlay_;
   ImsSettings settings_;
   uint64_t seed_ = 0;

@@ -7,20 +7,25 @@ namespace virga {
 
 inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
-     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased)"},
-    {"samples", "16", "fast: samples of each of these pixels in a pass"},
-    {"spacing", "8", "fast: their distance in either direction [pixels]"},
-    {"walks", "8192; 256 with shadow maps", "random walks from the lights in each pass"},
+     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing "
+     "is drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
+    {"samples", "16; frame: 8",
+     "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
+    {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
+    {"walks", "8192; 256 with shadow maps; frame: 16384", "random walks from the lights in each pass"},
     {"walk_flights", "tracking",
      "of these walks through heterogeneous media: tracking; marching: in steps of half a cell of the grid (biased)"},
-    {"lights", "8; 1 where a medium is heterogeneous",
-     "single virtual lights that light a vertex, where no number of walks is given"},
+    {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
+     "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of "
+     "all"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},
-    {"radius", "0.3 times the scene's extent, or, without shapes, the mean free path",
+    {"radius",
+     "0.3 times the scene's extent, or, without shapes, the mean free path; frame: twice the spacing of its lights",
      "virtual lights that are nearer are clamped, and what that takes is compensated [unit]"},
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
-    {"compensation", "path",
-     "path: eye paths go on within the radius; sampled: new vertices by restricted distances; none: clamped (biased)"},
+    {"compensation", "path; frame: spread",
+     "path: eye paths go on within the radius; sampled: new vertices by restricted distances; none: clamped (biased); "
+     "frame: spread, lights are balls of that radius (biased), or none"},
     {"levels", "-1", "sampled: levels of recursion; -1: until Russian roulette ends it"},
     {"ending", "unclamped", "sampled: beyond the last level: unclamped lights, reduced clamping, nothing (biased)"},
     {"v1", "1", "sampled: new vertices at the first level (V_1)"},
@@ -28,9 +33,9 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"p1", "0", "sampled: walks that light a vertex of the first level (P_1); 0: single lights"},
     {"p2", "0", "sampled: walks that light a vertex of further levels (P_2); 0: single lights"},
     {"transmittance", "exact", "sampled: to the new vertices: exact, or from the local mean of the medium (biased)"},
-    {"visibility", "exact",
-     "of virtual lights: exact; minimum_depth: exact, without rays where nothing can be in the way; shadow_map, none "
-     "(biased)"},
+    {"visibility", "exact; frame: shadow_map",
+     "of virtual lights: exact; minimum_depth: exact, without rays where nothing can be in the way (not in frames); "
+     "shadow_map, none (biased)"},
     {"map_resolution", "128", "shadow_map: of each light's map, texels in either direction"},
     {"map_points", "8192", "shadow_map: points of the scene's surfaces in each light's map"},
     {"show", "picture", "picture; lost: only what clamping takes; compensation: only what is found again"},

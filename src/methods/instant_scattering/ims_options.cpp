@@ -11,8 +11,8 @@
 namespace virga {
 namespace {
 
-constexpr std::string_view kMode[] = {"exact", "fast"};
-constexpr std::string_view kCompensate[] = {"path", "sampled", "none"};
+constexpr std::string_view kMode[] = {"exact", "fast", "frame"};
+constexpr std::string_view kCompensate[] = {"path", "sampled", "none", "spread"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
 constexpr std::string_view kTransmittance[] = {"exact", "mean"};
 constexpr std::string_view kVisibility[] = {"exact", "shadow_map", "minimum_depth", "none"};
@@ -20,9 +20,11 @@ constexpr std::string_view kFlights[] = {"tracking", "marching"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Random walks in each pass; shadow maps take time and memory for each of their lights.
-constexpr int kWalks = 8192, kWalksWithMaps = 256;
+constexpr int kWalks = 8192, kWalksWithMaps = 256, kFrameWalks = 16384;
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
+/// Of a frame, whose thousand lights share smaller maps' memory.
+constexpr int kFramePoints = 8, kFrameMapResolution = 64, kFrameMapPoints = 500;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -41,10 +43,32 @@ float extentOf(const SceneView& scene) {
   return longest > 0 ? longest : 1;
 }
 
+void readVisibility(const SettingsReader& reader, ImsOptions::Mode mode, LightVisibilityOptions& o) {
+  using Seen = LightVisibilityOptions::Mode;
+  const bool isFrame = mode == ImsOptions::Mode::frame;
+  const Seen byDefault = isFrame ? Seen::shadowMap : Seen::exact;
+  o.mode = static_cast<Seen>(reader.choice("visibility", kVisibility).value_or(static_cast<int>(byDefault)));
+  if (isFrame && o.mode == Seen::minimumDepth)
+    throw Error("--set ims.visibility=minimum_depth needs ims.mode=exact or fast: a frame has shadow maps");
+  o.resolution = reader.integer("map_resolution", 1).value_or(isFrame ? kFrameMapResolution : o.resolution);
+  o.points = reader.integer("map_points", 1).value_or(isFrame ? kFrameMapPoints : o.points);
+  if (o.resolution > LightVisibilityOptions::kMostResolution)
+    throw Error(fmt::format("--set ims.map_resolution may be at most {}", LightVisibilityOptions::kMostResolution));
+  if (o.points > LightVisibilityOptions::kMostPoints)
+    throw Error(fmt::format("--set ims.map_points may be at most {}", LightVisibilityOptions::kMostPoints));
+}
+
+/// How a frame's kernels see lights.
+ReceiverBatch::Visibility frameVisibility(LightVisibilityOptions::Mode mode) {
+  using Seen = LightVisibilityOptions::Mode;
+  if (mode == Seen::none) return ReceiverBatch::Visibility::none;
+  return mode == Seen::shadowMap ? ReceiverBatch::Visibility::maps : ReceiverBatch::Visibility::exact;
+}
+
 }  // namespace
 
 bool ImsOptions::biased() const {
-  if (mode == Mode::fast) return true;
+  if (mode != Mode::exact) return true;
   if (show != Show::picture || compensate == Compensate::none) return true;
   if (flights == FlightMode::marching) return true;
   using Seen = LightVisibilityOptions::Mode;
@@ -58,22 +82,17 @@ ImsSettings::ImsSettings(const Settings& settings) {
   const SettingsReader reader(settings, kImsSettings, "ims");
   ImsOptions& o = given_;
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
-  o.samples = reader.integer("samples", 1).value_or(o.samples);
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
-  o.visibility.mode = static_cast<LightVisibilityOptions::Mode>(reader.choice("visibility", kVisibility).value_or(0));
-  o.visibility.resolution = reader.integer("map_resolution", 1).value_or(o.visibility.resolution);
-  o.visibility.points = reader.integer("map_points", 1).value_or(o.visibility.points);
-  if (o.visibility.resolution > LightVisibilityOptions::kMostResolution)
-    throw Error(fmt::format("--set ims.map_resolution may be at most {}", LightVisibilityOptions::kMostResolution));
-  if (o.visibility.points > LightVisibilityOptions::kMostPoints)
-    throw Error(fmt::format("--set ims.map_points may be at most {}", LightVisibilityOptions::kMostPoints));
-  const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
-  o.walks = reader.integer("walks", 1).value_or(maps ? kWalksWithMaps : kWalks);
+  walks_ = reader.integer("walks", 1);
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
-  o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  o.samples = reader.integer("samples", 1).value_or(isFrame ? kFramePoints : o.samples);
+  o.compensate =
+      static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(isFrame ? 3 : 0));
   o.show = static_cast<ImsOptions::Show>(reader.choice("show", kShow).value_or(0));
+  readVisibility(reader, o.mode, o.visibility);
   o.gather.lostLight = o.show == ImsOptions::Show::lost;
   CompensationOptions& c = o.compensation;
   c.levels = reader.integer("levels", -1).value_or(-1);
@@ -89,8 +108,12 @@ ImsSettings::ImsSettings(const Settings& settings) {
   if (bound) radius_ = 1 / std::sqrt(*bound);
   if (o.show == ImsOptions::Show::compensation && o.compensate != ImsOptions::Compensate::sampled)
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
-  if (o.show != ImsOptions::Show::picture && o.mode == ImsOptions::Mode::fast)
-    throw Error("--set ims.show needs ims.mode=exact: fast does not tell parts of the picture apart");
+  if (o.show != ImsOptions::Show::picture && o.mode != ImsOptions::Mode::exact)
+    throw Error("--set ims.show needs ims.mode=exact: others do not tell parts of the picture apart");
+  if (isFrame && (o.compensate == ImsOptions::Compensate::path || o.compensate == ImsOptions::Compensate::sampled))
+    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread or none");
+  if (!isFrame && o.compensate == ImsOptions::Compensate::spread)
+    throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);
   rrDepth_ = reader.integer("rr_depth", 1);
 }
@@ -102,24 +125,33 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   const bool tracked = std::any_of(scene.view.media.begin(), scene.view.media.end(),
                                    [](const MediumView& medium) { return !medium.homogeneous; });
   if (!tracked) o.flights = FlightMode::tracking;  // it is the same, and exact
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  const int lights = tracked ? kLightsWhereTracked : kLights;
   for (GatherAmount* amount : {&o.amount, &o.compensation.amounts[0], &o.compensation.amounts[1]})
-    amount->lights = lights_.value_or(tracked ? kLightsWhereTracked : kLights);
+    amount->lights = isFrame ? lights : lights_.value_or(lights);
+  if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
+  const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
+  o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
   o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
   o.gather.bound = 1 / square(o.compensation.radius);
+  const bool spread = o.compensate == ImsOptions::Compensate::spread;
+  o.frame.visibility = frameVisibility(o.visibility.mode);
+  o.frame.near = {spread ? NearField::Kind::spread : NearField::Kind::clamped, radius_ ? o.gather.bound : 0};
   return o;
 }
 
 SettingValues valuesOf(const ImsOptions& o) {
+  const bool isFrame = o.mode == ImsOptions::Mode::frame, byLights = isFrame && !(o.frame.near.bound > 0);
   const CompensationOptions& c = o.compensation;
   return {{"mode", wordOf(kMode, o.mode)},
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
           {"walk_flights", wordOf(kFlights, o.flights)},
-          {"lights", std::to_string(o.amount.lights)},
+          {"lights", std::to_string(isFrame ? o.frameLights : o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
-          {"radius", fmt::format("{}", c.radius)},
-          {"bound", fmt::format("{}", o.gather.bound)},
+          {"radius", byLights ? "by the lights" : fmt::format("{}", c.radius)},
+          {"bound", byLights ? "by the lights" : fmt::format("{}", o.gather.bound)},
           {"compensation", wordOf(kCompensate, o.compensate)},
           {"levels", std::to_string(c.levels)},
           {"ending", wordOf(kEnding, c.ending)},

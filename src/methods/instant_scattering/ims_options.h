@@ -2,25 +2,28 @@
 #pragma once
 
 #include "methods/instant_scattering/compensation.h"
+#include "methods/instant_scattering/receivers.h"
 #include "methods/method.h"
 
 namespace virga {
 
 /// All that `ims` can be told, with the scene's own values where the settings are silent.
 struct ImsOptions {
-  enum class Mode { exact, fast };
-  enum class Compensate { path, sampled, none };
+  enum class Mode { exact, fast, frame };
+  enum class Compensate { path, sampled, none, spread };
   enum class Show { picture, lost, compensation };
 
   Mode mode = Mode::exact;
-  int samples = 16;  ///< fast: of a coarse pixel in each pass
-  int spacing = 8;   ///< fast: of coarse pixels [pixels]
+  int samples = 16;  ///< fast: of a coarse pixel in each pass; frame: points of its eye ray that are lit
+  int spacing = 8;   ///< fast, frame: of coarse pixels [pixels]
   int walks = 0;
   FlightMode flights = FlightMode::tracking;  ///< of the walks
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray
   GatherOptions gather;
   LightVisibilityOptions visibility;
+  int frameLights = 1300;        ///< frame: virtual lights that are kept
+  ReceiverBatch::Options frame;  ///< frame: how receivers are lit; a bound of 0: as the lights lie
   Compensate compensate = Compensate::path;
   CompensationOptions compensation;
   Show show = Show::picture;
@@ -41,7 +44,8 @@ class ImsSettings {
  private:
   ImsOptions given_;
   std::optional<float> radius_;
-  std::optional<int> lights_, maxDepth_, rrDepth_;
+  std::optional<int> walks_, lights_, maxDepth_, rrDepth_;
+  std::optional<int> compensate_;
 };
 
 /// The values that are in force, by the names of kImsSettings.

@@ -43,7 +43,8 @@ class ImsPixels {
     if (options_.path.maxDepth == 0) return {};
     Sampler sampler(id);
     const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
-    if (LayerRadiance marched; part == Part::direct && marches_ && marched_.add(camera, marched, sampler))
+    if (LayerRadiance marched;
+        part == Part::direct && marches_ && marched_.add(camera, marched, RandomNumbers{sampler}))
       return marched;
     Tracer::Path path = tracer_.start(camera);
     Tracer::Record record;

@@ -7,17 +7,14 @@
 #include "core/parallel.h"
 
 namespace virga {
-namespace {
 
-void refuseTooManyMaps(size_t lights, int resolution) {
+void refuseTooManyMaps(size_t lights, int resolution, std::string_view fewer) {
   const size_t memory = ShadowMaps::memory(lights, resolution);
   if (memory > LightVisibilityOptions::kMostMemory)
     throw Error(fmt::format("shadow maps of {} virtual lights would take {:.1f} GB of memory", lights,
                             static_cast<double>(memory) * 1e-9),
-                {{}, "ask for fewer --set ims.walks, or a smaller ims.map_resolution", {}});
+                {{}, fmt::format("ask for fewer --set ims.{}, or a smaller ims.map_resolution", fewer), {}});
 }
-
-}  // namespace
 
 LightVisibility::LightVisibility(const Scene& scene, const VirtualLights& lights, const SurfacePoints& points,
                                  const LightVisibilityOptions& options, uint64_t seed, const std::stop_token& stop)
@@ -25,7 +22,7 @@ LightVisibility::LightVisibility(const Scene& scene, const VirtualLights& lights
   using Mode = LightVisibilityOptions::Mode;
   if (mode_ == Mode::minimumDepth) minimumDepths_ = virga::minimumDepths(*scene.surfaceRays, lights.lights, stop);
   if (mode_ != Mode::shadowMap) return;
-  refuseTooManyMaps(lights.lights.size(), options.resolution);
+  refuseTooManyMaps(lights.lights.size(), options.resolution, "walks");
   maps_ = ShadowMaps(points, lights.lights, {.resolution = options.resolution, .seed = seed}, stop);
 }
 

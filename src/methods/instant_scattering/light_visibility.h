@@ -75,6 +75,9 @@ struct LightVisibilityView {
   }
 };
 
+/// Throws Error where so many maps take too much memory. `fewer`: the setting that their number comes from.
+void refuseTooManyMaps(size_t lights, int resolution, std::string_view fewer);
+
 /// What the visibility of virtual lights needs to know about each.
 class LightVisibility {
  public:

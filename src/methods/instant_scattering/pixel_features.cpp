@@ -2,27 +2,29 @@
 #include "methods/instant_scattering/pixel_features.h"
 
 #include "core/parallel.h"
-#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/eye_march.h"
 
 namespace virga {
 namespace {
 
-/// Steps through each stretch of media.
-constexpr int kSteps = 64;
+/// Mean of t in [0, 1] by exp(-depth t): 1 / depth - 1 / (exp(depth) - 1).
+float meanDistance(float d) { return d > 0.05f ? 1 / d - 1 / std::expm1(d) : 0.5f - d / 12; }
 
-/// Optical depth along a ray, gathered front to back.
-struct SeenMedia {
-  Rgb depth;
+/// Of what is seen of the media, by the mean of the channels; 0 if nothing is.
+float meanDepth(const MarchedEye& eye) {
   double weight = 0, moment = 0;
-
-  void add(float t0, float t1, Rgb here) {
-    const float before = mean(exp(depth * -1));
-    depth += here;
-    const float seen = before - mean(exp(depth * -1));
+  float depth = 0, before = 1;
+  for (int i = 0; i < eye.steps; ++i) {
+    const MarchedEye::Step& step = eye.step[i];
+    const float own = mean(step.depth());
+    depth += own;
+    const float after = std::exp(-depth), seen = before - after;
     weight += static_cast<double>(seen);
-    moment += static_cast<double>(seen * 0.5f * (t0 + t1));
+    moment += static_cast<double>(seen * lerp(step.t0, step.t1, meanDistance(own)));
+    before = after;
   }
-};
+  return weight > 0 ? static_cast<float>(moment / weight) : 0;
+}
 
 /// A colour by which the surface's light may be divided; of bsdfs other than diffuse ones nothing is known.
 Rgb reflectanceOf(const Side& side) {
@@ -33,34 +35,26 @@ Rgb reflectanceOf(const Side& side) {
 
 }  // namespace
 
-PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
-  const SceneView& view = scene.view;
-  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const CameraRay camera = scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  MediaRay r = leaveCamera(view, camera.ray);
-  const RayHit hit = rays.nearest(r.ray, camera.tMax);
+PixelFeatures pixelFeatures(const MarchedEye& eye) {
   PixelFeatures f;
   f.regular = true;
-  f.depth = hit.found() ? hit.t : kInfinity;
-  SeenMedia seen;
-  walkMedia(view, rays, r, hit.found() ? hit.t : camera.tMax, [&](float t0, float t1) {
-    return marchMedia(view, r.media, r.ray, t0, t1, kSteps, 0, [&](float a, float b, Rgb depth) {
-      seen.add(a, b, depth);
-      return true;
-    });
-  });
-  const Rgb transmittance = exp(seen.depth * -1);
+  f.depth = eye.hit.found() ? eye.hit.t : kInfinity;
+  const Rgb transmittance = transmittanceOf(eye.depth);
   f.opacity = Rgb(1.f) - transmittance;
-  f.mediaDepth = seen.weight > 0 ? static_cast<float>(seen.moment / seen.weight) : 0;
-  if (!hit.found()) return f;
-  const SurfacePoint point = surfacePoint(view.surfaces[hit.shape], r.ray, hit, view.scale);
-  Bsdf textured;
-  const Side side = sideOf(view, point, hit, -r.ray.d, textured);
-  f.regular = !side.bsdf->specular() && !side.bsdf->isThin();
-  f.p = point.p;
-  f.normal = dot(point.shadingNormal, r.ray.d) > 0 ? -point.shadingNormal : point.shadingNormal;
-  f.surface = transmittance * reflectanceOf(side);
+  f.mediaDepth = meanDepth(eye);
+  if (!eye.hit.found()) return f;
+  f.regular = !eye.side.bsdf->specular() && !eye.side.bsdf->isThin();
+  f.p = eye.point.p;
+  f.normal = dot(eye.point.shadingNormal, eye.at.ray.d) > 0 ? -eye.point.shadingNormal : eye.point.shadingNormal;
+  f.surface = transmittance * reflectanceOf(eye.side);
   return f;
+}
+
+PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
+  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  MarchedEye eye;
+  marchEye(scene.view, rays, scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f), 0, eye);
+  return pixelFeatures(eye);
 }
 
 std::vector<PixelFeatures> pictureFeatures(const Scene& scene, const std::stop_token& stop) {

@@ -4,6 +4,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "methods/instant_scattering/eye_march.h"
 #include "scene/scene.h"
 
 namespace virga {
@@ -18,7 +19,9 @@ struct PixelFeatures {
   float mediaDepth = 0;  ///< mean distance of the media, by how much of them is seen there [unit]
 };
 
-/// Of the ray through the middle of pixel (x, y). Media are marched through; there is nothing random.
+/// Of an eye ray.
+PixelFeatures pixelFeatures(const MarchedEye& eye);
+/// Of the ray through the middle of pixel (x, y); there is nothing random.
 PixelFeatures pixelFeatures(const Scene& scene, int x, int y);
 
 /// Of all pixels, row by row. A stop leaves rows out.

@@ -15,7 +15,7 @@ constexpr float kLeastAgreement = 0.02f;
 /// What is seen by less than this share needs no care.
 constexpr float kFaint = 2e-3f;
 
-float bell(float x) { return std::exp(-0.5f * x * x); }
+float bell(float x, float y) { return std::exp(-0.5f * (x * x + y * y)); }
 
 /// Cubic B-spline at the four knots around the place t in [0, 1) between the middle two.
 std::array<float, 4> spline(float t) {
@@ -27,14 +27,14 @@ float surfacesAgree(const PixelFeatures& a, const PixelFeatures& b) {
   if (std::isinf(a.depth) || std::isinf(b.depth)) return 0;
   const Vec3 way = b.p - a.p;
   const float off = std::max(std::fabs(dot(way, a.normal)), std::fabs(dot(way, b.normal)));
-  return bell(off / (kDepthWidth * std::min(a.depth, b.depth))) * bell((1 - dot(a.normal, b.normal)) / kNormalWidth);
+  return bell(off / (kDepthWidth * std::min(a.depth, b.depth)), (1 - dot(a.normal, b.normal)) / kNormalWidth);
 }
 
 float mediaAgree(const PixelFeatures& a, const PixelFeatures& b) {
   const float least = std::min(a.mediaDepth, b.mediaDepth);
   if (!(least > 0)) return 0;
-  return bell((a.mediaDepth - b.mediaDepth) / (kMediaDepthWidth * least)) *
-         bell((mean(a.opacity) - mean(b.opacity)) / kOpacityWidth);
+  return bell((a.mediaDepth - b.mediaDepth) / (kMediaDepthWidth * least),
+              (mean(a.opacity) - mean(b.opacity)) / kOpacityWidth);
 }
 
 /// Sum of weight * light over the sum of weight * veil, seen through the pixel's own veil.
@@ -85,32 +85,36 @@ int Upsampling::coarseIndex(int i, int j) const {
   return std::clamp(j, 0, rows_ - 1) * columns_ + std::clamp(i, 0, columns_ - 1);
 }
 
-Upsampling::Weights Upsampling::weights(int x, int y) const {
-  const PixelFeatures& here = features(x, y);
+Upsampling::Place Upsampling::placeOf(int x, int y) const {
   const float u = (static_cast<float>(x) - static_cast<float>(spacing_ / 2)) / static_cast<float>(spacing_);
   const float v = (static_cast<float>(y) - static_cast<float>(spacing_ / 2)) / static_cast<float>(spacing_);
   const int i0 = static_cast<int>(std::floor(u)), j0 = static_cast<int>(std::floor(v));
-  const auto wx = spline(u - static_cast<float>(i0)), wy = spline(v - static_cast<float>(j0));
-  Weights w;
-  for (int b = 0; b < kTaps; ++b)
-    for (int a = 0; a < kTaps; ++a) {
-      const Pixel& p = computed_[static_cast<size_t>(coarseIndex(i0 - 1 + a, j0 - 1 + b))];
-      const PixelFeatures& there = features(p.x, p.y);
-      const float s = there.regular ? wx[static_cast<size_t>(a)] * wy[static_cast<size_t>(b)] : 0;
-      const int tap = b * kTaps + a;
-      w.surfaceSum += w.surface[tap] = s > 0 ? s * surfacesAgree(here, there) : 0;
-      w.mediaSum += w.media[tap] = s > 0 ? s * mediaAgree(here, there) : 0;
-    }
-  return w;
+  return {i0 - 1, j0 - 1, spline(u - static_cast<float>(i0)), spline(v - static_cast<float>(j0))};
+}
+
+void Upsampling::addTap(const PixelFeatures& here, const Place& place, int tap, Weights& w) const {
+  const int a = tap % kTaps, b = tap / kTaps;
+  const Pixel& p = computed_[static_cast<size_t>(coarseIndex(place.i + a, place.j + b))];
+  const PixelFeatures& there = features(p.x, p.y);
+  const float s = there.regular ? place.wx[static_cast<size_t>(a)] * place.wy[static_cast<size_t>(b)] : 0;
+  const bool seesSurface = maxComponent(here.surface) > 0, seesMedia = maxComponent(here.opacity) > 0;
+  w.surfaceSum += w.surface[tap] = s > 0 && seesSurface ? s * surfacesAgree(here, there) : 0;
+  w.mediaSum += w.media[tap] = s > 0 && seesMedia ? s * mediaAgree(here, there) : 0;
 }
 
 bool Upsampling::needsOwn(int x, int y) const {
   if (own_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)] != kFiltered) return false;
   const PixelFeatures& f = features(x, y);
   if (!f.regular) return true;
-  const Weights w = weights(x, y);
-  return (maxComponent(f.surface) > kFaint && w.surfaceSum < kLeastAgreement) ||
-         (maxComponent(f.opacity) > kFaint && w.mediaSum < kLeastAgreement);
+  const bool surface = maxComponent(f.surface) > kFaint, media = maxComponent(f.opacity) > kFaint;
+  const Place place = placeOf(x, y);
+  Weights w;
+  // The nearest ones first: they are mostly enough.
+  for (const int tap : {5, 6, 9, 10, 1, 2, 4, 7, 8, 11, 13, 14, 0, 3, 12, 15}) {
+    if ((!surface || w.surfaceSum >= kLeastAgreement) && (!media || w.mediaSum >= kLeastAgreement)) return false;
+    addTap(f, place, tap, w);
+  }
+  return (surface && w.surfaceSum < kLeastAgreement) || (media && w.mediaSum < kLeastAgreement);
 }
 
 Upsampling::Light Upsampling::at(const std::vector<Light>& computed, int x, int y) const {
@@ -118,11 +122,12 @@ Upsampling::Light Upsampling::at(const std::vector<Light>& computed, int x, int 
   const bool coarse = own < static_cast<uint32_t>(columns_ * rows_);
   const PixelFeatures& here = features(x, y);
   if (own != kFiltered && (!coarse || !here.regular)) return computed[own];
-  const Weights w = weights(x, y);
-  const float u = (static_cast<float>(x) - static_cast<float>(spacing_ / 2)) / static_cast<float>(spacing_);
-  const float v = (static_cast<float>(y) - static_cast<float>(spacing_ / 2)) / static_cast<float>(spacing_);
-  const int i0 = static_cast<int>(std::floor(u)) - 1, j0 = static_cast<int>(std::floor(v)) - 1;
-  const auto index = [&](int tap) { return static_cast<size_t>(coarseIndex(i0 + tap % kTaps, j0 + tap / kTaps)); };
+  const Place place = placeOf(x, y);
+  Weights w;
+  for (int tap = 0; tap < kTaps * kTaps; ++tap) addTap(here, place, tap, w);
+  const auto index = [&](int tap) {
+    return static_cast<size_t>(coarseIndex(place.i + tap % kTaps, place.j + tap / kTaps));
+  };
   const auto featuresOf = [&](int tap) -> const PixelFeatures& {
     const Pixel& p = computed_[index(tap)];
     return features(p.x, p.y);

@@ -42,7 +42,13 @@ class Upsampling {
     float surface[kTaps * kTaps], media[kTaps * kTaps];
     float surfaceSum = 0, mediaSum = 0;
   };
-  Weights weights(int x, int y) const;
+  /// The coarse pixels around one: the first column and row, and their weights by distance alone.
+  struct Place {
+    int i, j;
+    std::array<float, kTaps> wx, wy;
+  };
+  Place placeOf(int x, int y) const;
+  void addTap(const PixelFeatures& here, const Place& place, int tap, Weights& w) const;
   const PixelFeatures& features(int x, int y) const {
     return features_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)];
   }

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "transport/visibility.h"
+#include "volume/lookup_along.h"
+
+namespace virga {
+
+/// The medium's density is a dense grid of scalars with nothing around it, small enough for lookupAlong().
+VIRGA_HD inline bool isPlainGrid(const MediumView& medium) {
+  const GridView& grid = medium.density;
+  if (medium.homogeneous || grid.kind != GridView::Kind::dense || grid.background > 0) return false;
+  return !medium.densityColors.values && double{1} * grid.dense.nx * grid.dense.ny * grid.dense.nz < 2147483648.0;
+}
+
+/// Steps whose densities are looked up together.
+inline constexpr int kMarchedAtOnce = 65;
+
+/// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
+/// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
+/// returns false. Homogeneous media are exact, and a single step.
+template <class Visit>
+VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const Ray& ray, float t0, float t1, int steps,
+                         float shift, Visit&& visit) {
+  float begin = t1, end = t0, thickest = 0;
+  bool homogeneous = true;
+  for (int i = 0; i < media.count(); ++i) {
+    const MediumView& medium = scene.media[media.medium(i)];
+    homogeneous &= medium.homogeneous;
+    thickest = std::max(thickest, medium.sigmaT);
+    ClippedRange in{t0, t1};
+    if (!medium.homogeneous && !(medium.density.background > 0))
+      in = clipToBox(medium.worldToDensity.point(ray.o), medium.worldToDensity.vector(ray.d), medium.density.supportLo,
+                     medium.density.supportHi, t0, t1);
+    if (!(in.t0 < in.t1)) continue;
+    begin = std::min(begin, in.t0), end = std::max(end, in.t1);
+  }
+  if (!(begin < end) || !(thickest > 0)) return true;
+  // A stretch without end is dark beyond so many mean free paths.
+  end = std::min(end, begin + 40 / thickest);
+  if (homogeneous) steps = 1, shift = 0;
+  const float step = (end - begin) / static_cast<float>(steps);
+  const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
+  const MediumView& first = scene.media[media.medium(0)];
+  if (media.count() == 1 && isPlainGrid(first)) {
+    float density[kMarchedAtOnce];
+    for (int n0 = 0; n0 <= steps; n0 += kMarchedAtOnce) {
+      const int count = std::min(kMarchedAtOnce, steps + 1 - n0);
+      // The first step and the last may be cut: their middles are off by less than half a step.
+      const GridRay inGrid(first, {ray.at(begin + step * (static_cast<float>(n0) + 0.5f - shift)), ray.d * step});
+      lookupAlong(first.density, inGrid.o, inGrid.d, count, density);
+      for (int n = 0; n < count; ++n) {
+        const float a = border(n0 + n), b = std::min(end, border(n0 + n + 1));
+        if (a < b && !visit(a, b, first.spectrum * (first.sigmaT * density[n] * (b - a)))) return false;
+      }
+    }
+    return true;
+  }
+  for (int n = 0; n <= steps; ++n) {
+    const float a = border(n), b = std::min(end, border(n + 1));
+    if (!(a < b)) continue;
+    const Vec3 p = ray.at(0.5f * (a + b));
+    Rgb sigmaT;
+    for (int i = 0; i < media.count(); ++i) sigmaT += scene.media[media.medium(i)].sigmaTAt(p);
+    if (!visit(a, b, sigmaT * (b - a))) return false;
+  }
+  return true;
+}
+
+/// Of an optical depth. Mostly it is grey, and one exponential does.
+VIRGA_HD inline Rgb transmittanceOf(Rgb depth) { return isGrey(depth) ? Rgb(std::exp(-depth.r)) : exp(depth * -1); }
+
+/// Transmittance along a ray by marching; null boundaries are passed, surfaces are not looked at.
+template <class Rays>
+VIRGA_HD Rgb marchedTransmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, int steps,
+                                  float shift) {
+  Rgb depth;
+  walkMedia(scene, rays, r, tMax, [&](float t0, float t1) {
+    return marchMedia(scene, r.media, r.ray, t0, t1, steps, shift, [&](float, float, Rgb here) {
+      depth += here;
+      return true;
+    });
+  });
+  return transmittanceOf(depth);
+}
+
+/// An eye ray: the media that it passes, by marching, and the surface that it meets.
+struct MarchedEye {
+  static constexpr int kSteps = 128;  ///< through each stretch of media
+  static constexpr int kMostStretches = 8, kMostSteps = kMostStretches * (kSteps + 1);
+
+  /// A step along the ray. Plain numbers, so that an eye is not cleared before it is filled.
+  struct Step {
+    float t0, t1;
+    float before[3], own[3];  ///< optical depth to it, and its own
+    int stretch;              ///< which of `media` holds there
+
+    VIRGA_HD Rgb depthBefore() const { return {before[0], before[1], before[2]}; }
+    VIRGA_HD Rgb depth() const { return {own[0], own[1], own[2]}; }
+  };
+
+  MediaRay at;  ///< its media are those at the surface, or at the end
+  RayHit hit;
+  Rgb depth;  ///< optical depth of all of it
+  int steps = 0, stretches = 0;
+  Step step[kMostSteps];
+  MediaState media[kMostStretches];
+  SurfacePoint point;  ///< where it meets a surface, as the following ones
+  Side side;
+  Bsdf textured;
+
+  bool broad = true;  ///< no mirror, glass or narrow bsdf is met
+
+  VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
+
+  /// Points in equal parts of what is seen of the media, each of them at `shift` in [0, 1) of its part:
+  /// visit(k, point, sigma_t tau over the density with which it was chosen, media).
+  template <class Visit>
+  VIRGA_HD void visitPoints(int count, float shift, Visit&& visit) const {
+    const float seen = opacity();
+    if (!(seen > 0) || steps == 0) return;
+    int i = 0;
+    for (int k = 0; k < count; ++k) {
+      const float reached = -std::log1p(-seen * (static_cast<float>(k) + shift) / static_cast<float>(count));
+      while (i + 1 < steps && mean(step[i + 1].depthBefore()) <= reached) ++i;
+      const Step& s = step[i];
+      const Rgb before = s.depthBefore(), own = s.depth();
+      const float here = clamp((reached - mean(before)) / mean(own), 0, 1);
+      // The density is that of the mean channel.
+      const Rgb passed = before + own * here;
+      const Rgb weight = own * transmittanceOf(passed) * (seen / (mean(own) * std::exp(-mean(passed))));
+      visit(k, at.ray.at(lerp(s.t0, s.t1, here)), weight, media[s.stretch]);
+    }
+  }
+};
+
+/// Fills `eye`, steps shifted by `shift`.
+template <class Rays>
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
+                       MarchedEye& eye) {
+  eye.at = leaveCamera(scene, camera.ray);
+  eye.hit = rays.nearest(eye.at.ray, camera.tMax);
+  if (eye.hit.found()) {
+    eye.point = surfacePoint(scene.surfaces[eye.hit.shape], eye.at.ray, eye.hit, scene.scale);
+    eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
+    eye.broad = eye.side.bsdf->broad();
+  }
+  walkMedia(scene, rays, eye.at, eye.hit.found() ? eye.hit.t : camera.tMax, [&](float t0, float t1) {
+    if (eye.at.media.vacuum()) return true;
+    const bool kept = eye.stretches < MarchedEye::kMostStretches;
+    if (kept) eye.media[eye.stretches] = eye.at.media;
+    marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, MarchedEye::kSteps, shift, [&](float a, float b, Rgb here) {
+      if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))
+        eye.step[eye.steps++] = {
+            a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
+      eye.depth += here;
+      return true;
+    });
+    eye.stretches += kept ? 1 : 0;
+    return true;
+  });
+}
+
+}  // namespace virga

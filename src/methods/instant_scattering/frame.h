@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "methods/instant_scattering/frame_pixels.h"
+#include "methods/instant_scattering/ims_pixels.h"
+#include "methods/pixels.h"
+
+namespace virga {
+
+/// `ims.mode=frame` (section 5 of the paper): few walks, all of whose virtual lights light every coarse pixel. A pass
+/// is a function of (scene, camera, settings, number of the pass): nothing is drawn by chance in a pixel, and the walks
+/// stay the same when the camera moves. Passes are averaged: each has other walks and other fixed points.
+class FrameRenderer {
+ public:
+  /// What an edit has changed is forgotten.
+  void forget(const ChangeSet& changes);
+
+  /// Fills `frame`; false if it was stopped on the way.
+  bool pass(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index, const std::stop_token& stop,
+            PassFrame& frame);
+
+  /// Of the last pass; null before the first.
+  const FrameLights* lights() const { return lights_.get(); }
+
+ private:
+  bool prepareLights(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
+                     const std::stop_token& stop);
+
+  std::unique_ptr<FrameLights> lights_;
+  uint32_t lightsOf_ = 0;  ///< the pass that they belong to
+  int around_ = 0;         ///< the medium that had no end when they were made
+};
+
+}  // namespace virga

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stop_token>
+#include <vector>
+
+#include "methods/instant_scattering/frame_kernels.h"
+#include "transport/virtual_lights.h"
+
+namespace virga {
+
+/// The virtual lights of a frame as its kernels take them. They depend on the scene, not on the camera.
+class FrameLights {
+ public:
+  enum class ShadowMapping { none, maps };
+  struct Options {
+    int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
+    ShadowMapping shadows = ShadowMapping::maps;
+    int resolution = 64;     ///< of a map, texels in either direction
+    int points = 500;        ///< of the surfaces, in each map
+    float turn = 0.5f;  ///< in [0, 1): which ones
+  };
+  struct Light {
+    KernelLight kernel;
+    EndKind kind;
+    const LightVertex* vertex;  ///< in virtualLights()
+    float share;                ///< by which the vertex's weight counts
+    bool plain;  ///< the kernels know its bsdf or phase function; of others the kernel's light says only where they are
+  };
+
+  /// Of many lights few are kept, evenly in space and by their weight; all of these stand for as much light, and in
+  /// expectation they light as all would. A stop leaves lights out.
+  FrameLights(const Scene& scene, VirtualLights lights, const Options& options, const std::stop_token& stop);
+  FrameLights(const FrameLights&) = delete;
+  FrameLights& operator=(const FrameLights&) = delete;
+
+  const VirtualLights& virtualLights() const { return virtualLights_; }
+  /// Those on surfaces, then those in media.
+  const std::vector<Light>& lights() const { return lights_; }
+
+  /// Of the lights in media, or of all where there are none there: edge of the cube that each has for itself [unit].
+  float spacing() const;
+
+  /// Transmittance from light number i to receivers of a kind, for each channel; surfaces are looked at where there are
+  /// shadow maps. `seen` points to three arrays of to.count values; on return the second and the third may be the same
+  /// as the first.
+  void lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const;
+
+ private:
+  enum class Between { nothing, fog, media };
+
+  size_t texelsOfMap() const { return static_cast<size_t>(mapSide_) * static_cast<size_t>(mapSide_); }
+  void makeMaps(const Scene& scene, const Options& options, const std::stop_token& stop);
+  void makeTables(const Scene& scene, const std::stop_token& stop);
+  void fillTable(const Scene& scene, size_t i);
+
+  VirtualLights virtualLights_;
+  std::vector<Light> lights_;
+  Between between_ = Between::nothing;
+  Rgb fog_;                       ///< extinction of the homogeneous medium that is everywhere [1/unit]
+  int channels_ = 1;              ///< that differ
+  std::vector<float> depth_;      ///< tables of the first light, channel by channel, of the second...
+  std::vector<DepthView> views_;  ///< of each light's tables
+  std::vector<float> maps_;       ///< shadow maps of the lights; empty: there are none
+  int mapSide_ = 0;               ///< texels of a map in either direction
+};
+
+/// How the kernels know a phase function, and its g; false if they do not.
+bool plainPhase(const PhaseFunction& phase, EndKind& kind, float& g);
+
+}  // namespace virga

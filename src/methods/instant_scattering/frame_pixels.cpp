@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/instant_scattering/frame_pixels.h"
+
+namespace virga {
+
+CameraRay FramePixels::cameraRay(int x, int y) const {
+  const Vec2 offset = scene_.filter.sample(numbers_.place());
+  return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+}
+
+bool FramePixels::direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const {
+  MarchedEye eye;
+  marchEye(scene_.view, rays_, cameraRay(x, y), numbers_.shift(), eye);
+  features = pixelFeatures(eye);
+  if (eye.broad) marched_.add(eye, radiance, numbers_);
+  return eye.broad;
+}
+
+template <class Visit>
+void FramePixels::visitReceivers(const MarchedEye& eye, Visit&& visit) const {
+  const Vec3 wo = -eye.at.ray.d;
+  const float share = 1 / static_cast<float>(options_.samples);
+  eye.visitPoints(options_.samples, numbers_.shift(), [&](int, Vec3 p, Rgb weight, const MediaState& media) {
+    Rgb sigmaT;
+    for (int i = 0; i < media.count(); ++i) sigmaT += scene_.view.media[media.medium(i)].sigmaTAt(p);
+    for (int i = 0; i < media.count(); ++i) {
+      Receiver r{Vertex::inMedium(scene_.view, media.medium(i), p, wo, media), weight * share};
+      const Rgb own = scene_.view.media[media.medium(i)].sigmaTAt(p);
+      for (int c = 0; c < 3; ++c) r.throughput[c] *= sigmaT[c] > 0 ? own[c] / sigmaT[c] : 0;
+      visit(std::move(r));
+    }
+  });
+  if (eye.hit.found()) visit({Vertex::onSurface(eye.point, eye.side, wo, eye.at.media), transmittanceOf(eye.depth)});
+}
+
+std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<const Pixel> pixels) const {
+  ReceiverBatch batch;
+  std::vector<std::optional<Upsampling::Light>> light(pixels.size());
+  for (size_t n = 0; n < pixels.size(); ++n) {
+    MarchedEye eye;
+    marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye);
+    if (!eye.broad) continue;
+    light[n].emplace();
+    visitReceivers(eye, [&](Receiver r) {
+      r.pixel = static_cast<int>(n);
+      batch.add(scene_.view, r);
+    });
+  }
+  batch.gather(scene_, lights_, options_.frame, [&](int pixel, VertexKind x1, VertexKind x2, Rgb found) {
+    Upsampling::Light& l = *light[static_cast<size_t>(pixel)];
+    (x1 == VertexKind::surface ? l.surface : l.media)[x2 == VertexKind::medium] += found;
+  });
+  return light;
+}
+
+}  // namespace virga

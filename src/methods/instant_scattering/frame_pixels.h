@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+
+#include "methods/instant_scattering/ims_options.h"
+#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/receivers.h"
+#include "methods/instant_scattering/upsampling.h"
+
+namespace virga {
+
+/// Pixels of a frame: functions of the scene, the camera and the virtual lights, nothing of which is drawn by chance.
+/// All of these must outlive it. Safe to call from many threads.
+class FramePixels {
+ public:
+  /// `pass` turns the fixed numbers: passes that are averaged look at different points.
+  FramePixels(const Scene& scene, const FrameLights& lights, const ImsOptions& options, uint32_t pass)
+      : scene_(scene),
+        rays_{*scene.surfaceRays, *scene.boundaryRays},
+        lights_(lights),
+        options_(options),
+        numbers_{pass},
+        lamps_(fogLamps(scene.view, numbers_)),
+        marched_(scene_.view, rays_, &lamps_) {}
+  FramePixels(const FramePixels&) = delete;
+  FramePixels& operator=(const FramePixels&) = delete;
+
+  using Pixel = Upsampling::Pixel;
+
+  /// What is seen, and light of x1 straight from lamps. False, and no light added, where a mirror, glass or a narrow
+  /// bsdf is seen.
+  bool direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const;
+
+  /// Light that the virtual lights send by way of each pixel's x1; nothing where direct() is false.
+  std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;
+
+ private:
+  /// The points of a pixel's eye ray that are lit.
+  template <class Visit>
+  void visitReceivers(const MarchedEye& eye, Visit&& visit) const;
+  CameraRay cameraRay(int x, int y) const;
+
+  const Scene& scene_;
+  EmbreeRays rays_;
+  const FrameLights& lights_;
+  const ImsOptions& options_;
+  FixedNumbers numbers_;
+  FogLamps lamps_;
+  MarchedLight<EmbreeRays> marched_;  ///< refers to the members above
+};
+
+}  // namespace virga

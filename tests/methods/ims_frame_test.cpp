@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames of instant multiple scattering: coherence over time, accuracy, and the kernels that they are made of.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "methods/ims_scenes.h"
+#include "methods/instant_scattering/frame_lights.h"
+#include "methods/instant_scattering/marched_light.h"
+#include "methods/rendering.h"
+#include "volume/grid.h"
+#include "volume/lookup_along.h"
+#include "volume/procedural.h"
+
+namespace virga {
+namespace {
+
+using namespace virga::testing;
+
+RenderSession frames(const std::string& elements, int passes, const SettingValues& more = {}, uint64_t seed = 1) {
+  SettingValues settings{{"mode", "frame"}, {"spacing", "4"}, {"walks", "2048"}};
+  for (const auto& [name, value] : more) settings[name] = value;
+  return rendered(sceneOf(elements),
+                  {.passes = passes, .seed = seed, .layers = LayerMask::all(), .method = "ims", .settings = settings});
+}
+
+/// Light that virtual lights bring.
+Image indirect(const RenderSession& session) {
+  Image sum = session.film().layer(Layer::surfaceToSurface);
+  for (const Layer layer : {Layer::mediaToSurface, Layer::surfaceToMedia, Layer::mediaToMedia}) {
+    const Image more = session.film().layer(layer);
+    for (size_t i = 0; i < sum.pixels.size(); ++i) sum.pixels[i] += more.pixels[i];
+  }
+  return sum;
+}
+
+/// Changes of the pixels from one picture to another, over their own value and the picture's mean, in order.
+std::vector<double> changes(const Image& from, const Image& to) {
+  const double level = pixelMoments(from).mean();
+  std::vector<double> all;
+  for (size_t i = 0; i < from.pixels.size(); ++i) {
+    const auto a = static_cast<double>(mean(from.pixels[i])), b = static_cast<double>(mean(to.pixels[i]));
+    all.push_back(std::fabs(a - b) / (a + level));
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+double rootMeanSquare(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return std::sqrt(sum / static_cast<double>(values.size()));
+}
+
+// --- coherence ---
+
+TEST(ImsFrame, IsAFunctionOfItsInputForAnyNumberOfThreads) {
+  const auto picture = [](const std::string& scene, size_t threads) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return frames(scene, 2, {{"walks", "500"}, {"lights", "200"}}).film().beauty();
+  };
+  for (const std::string& scene : {plume(24), fog(24)}) {
+    const Image one = picture(scene, 1);
+    EXPECT_EQ(largestDifference(one, picture(scene, 4)), 0);
+    EXPECT_EQ(largestDifference(one, picture(scene, 1)), 0);
+  }
+}
+
+// The camera goes a twentieth of a pixel's width to the side. The light of virtual lights must hardly change, but where
+// a silhouette or the smoke's own edge passes the middle of a pixel; with other walks in each frame it does: that is
+// what flickers.
+void expectCoherent(const std::string& before, const std::string& after) {
+  const Image first = indirect(frames(before, 1));
+  const std::vector<double> same = changes(first, indirect(frames(after, 1)));
+  const std::vector<double> fresh = changes(first, indirect(frames(after, 1, {}, 2)));
+  const size_t most = same.size() * 9 / 10;
+  EXPECT_LT(same[most], 0.005);
+  EXPECT_LT(rootMeanSquare(same), 0.5 * rootMeanSquare(fresh));
+  EXPECT_GT(fresh[most], 0.02) << "the test cannot tell frames that flicker";
+}
+TEST(ImsFrame, NothingPopsInSmokeWhenTheCameraMoves) { expectCoherent(plume(64), plume(64, 0.002f)); }
+TEST(ImsFrame, NothingPopsInFogWhenTheCameraMoves) {
+  expectCoherent(fog(64), fog(64, R"(<bsdf type="diffuse"/>)", 0.002f));
+}
+
+TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
+  const Settings settings{{{"mode", "frame"}, {"walks", "500"}}, 1};
+  RenderSession moved(sceneOf(fog(24)), findMethod("ims"), {.settings = settings});
+  moved.step();
+  moved.edit(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), {{{{"camera"}, Aspect::camera}}});
+  moved.step();
+  RenderSession fresh(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), findMethod("ims"), {.settings = settings});
+  fresh.step();
+  EXPECT_EQ(largestDifference(moved.film().beauty(), fresh.film().beauty()), 0);
+}
+
+// --- accuracy ---
+
+void expectNear(const std::string& elements, double tolerance, int passes, const SettingValues& settings = {},
+                int truthPasses = 240) {
+  const RenderSession truth =
+      rendered(sceneOf(elements), {.passes = truthPasses, .seed = 5, .layers = LayerMask::all()});
+  const RenderSession own = frames(elements, passes, settings);
+  const double beauty = replicateMoments(truth.film()).mean();
+  for (int l = 0; l < kLayerCount; ++l) {
+    const auto layer = static_cast<Layer>(l);
+    const stats::Moments a = replicateMoments(own.film(), layer), b = replicateMoments(truth.film(), layer);
+    const double noise = 4 * std::hypot(a.standardError(), b.standardError());
+    EXPECT_NEAR(a.mean(), b.mean(), tolerance * b.mean() + 2e-3 * beauty + noise)
+        << kLayerNames[static_cast<size_t>(l)];
+    EXPECT_LT(noise, 0.1 * beauty) << kLayerNames[static_cast<size_t>(l)] << ": too few samples to tell ("
+                                   << a.standardError() << ", " << b.standardError() << ")";
+  }
+}
+
+TEST(ImsFrame, LayersOfAPlumeAreNearTheTruth) {
+  expectNear(plume(48), 0.1, 8, {{"walks", "65536"}});  // few of which meet the plume
+}
+TEST(ImsFrame, LayersOfFogAreNearTheTruth) { expectNear(fog(32), 0.06, 16, {{"lights", "650"}}); }
+// Bsdfs and phase functions that the kernels do not know go by their own scattering; glass goes by paths.
+TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
+  const std::string phong = R"(<bsdf type="phong"><rgb name="diffuse_reflectance" value="0.3"/>
+    <rgb name="specular_reflectance" value="0.4"/><float name="exponent" value="10"/></bsdf>)";
+  expectNear(fog(24, phong), 0.06, 16, {{"lights", "300"}});
+}
+TEST(ImsFrame, GlassGoesByPaths) { expectNear(fog(16, R"(<bsdf type="dielectric"/>)"), 0.06, 16, {{"lights", "300"}}); }
+
+// Many walks, all of their lights, hardly spread, exact visibility: the frame goes to the truth.
+TEST(ImsFrame, ManyLightsGoToTheTruth) {
+  const std::string ball = pinpointSensor("0, 0, 3", "0.1, 0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)");
+  const std::string scene = R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/>
+    <float name="albedo" value="0.9"/><phase type="hg"><float name="g" value="0.4"/></phase></medium>)" +
+                            ball + R"(
+    <emitter type="point"><point name="position" x="1" y="1.5" z="1"/><rgb name="intensity" value="9"/></emitter>
+    <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse"/></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="9"/><rotate x="1" angle="-90"/><translate y="-1"/>
+      </transform><bsdf type="diffuse"/></shape>)";
+  expectNear(scene, 0.02, 8,
+             {{"walks", "16384"},
+              {"lights", "1000000"},
+              {"radius", "0.1"},
+              {"visibility", "exact"},
+              {"spacing", "16"},
+              {"samples", "4"}},
+             1500);
+}
+
+TEST(ImsFrame, PathsOfOneSegmentShowLampsAlone) {
+  EXPECT_EQ(pixelMoments(frames(plume(16), 1, {{"max_depth", "1"}}).film().beauty()).mean(), 0);
+}
+TEST(ImsFrame, PathsOfTwoSegmentsAreDirectLight) {
+  const RenderSession session = frames(plume(16), 1, {{"max_depth", "2"}});
+  EXPECT_EQ(pixelMoments(indirect(session)).mean(), 0);
+  EXPECT_GT(pixelMoments(session.film().beauty()).mean(), 0);
+}
+
+TEST(ImsFrame, RefusesWhatItCannotDo) {
+  for (const char* compensation : {"path", "sampled"})
+    EXPECT_THROW(frames(fog(8), 1, {{"compensation", compensation}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"mode", "exact"}, {"compensation", "spread"}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"visibility", "minimum_depth"}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"show", "lost"}}), Error);
+}
+
+TEST(ImsFrame, AStopLeavesNothing) {
+  std::stop_source stop;
+  stop.request_stop();
+  RenderSession session(sceneOf(fog(8)), findMethod("ims"),
+                        {.settings = {.values = {{"mode", "frame"}, {"walks", "500"}}}});
+  EXPECT_FALSE(session.step({}, stop.get_token()).completed);
+  EXPECT_TRUE(session.step().completed);
+  EXPECT_TRUE(session.step().biased);
+}
+
+// --- kernels ---
+
+TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
+  const float bound = 4, radius = 0.5f;  // 1 / sqrt(bound)
+  double spread = 0;
+  const int n = 100000;
+  for (int i = 0; i < n; ++i) {
+    const float d = radius * (static_cast<float>(i) + 0.5f) / n;
+    spread += static_cast<double>(kernels::spreadFalloff(d * d, bound) * d * d) * static_cast<double>(radius) / n;
+  }
+  EXPECT_NEAR(spread, static_cast<double>(radius), 1e-4);  // as does 1 / d^2
+  EXPECT_NEAR(kernels::spreadFalloff(0.2499f, bound), kernels::spreadFalloff(0.2501f, bound), 0.01f);
+}
+
+TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
+  FogLamps lamps;
+  for (int k = 0; k < FogLamps::kCount; ++k) {
+    lamps.known[k] = true, lamps.px[k] = 0.3f, lamps.py[k] = 0.5f, lamps.pz[k] = -2;
+    lamps.all[k] = 1, lamps.r[k] = lamps.g[k] = lamps.b[k] = 1.f / FogLamps::kCount;
+  }
+  const FogRay ray{0, 0, 0, 0, 0, -1, 0.5f, 4, {0.4f, 0.8f, 0}, 0.3f};
+  double truth = 0;
+  const int n = 200000;
+  for (int i = 0; i < n; ++i) {
+    const double t = 0.5 + 3.5 * (i + 0.5) / n, z = -2 + t, d2 = 0.34 + z * z, c = (t - 2) / std::sqrt(d2);
+    const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
+    truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
+  }
+  float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
+  constexpr int kShifts = 16;
+  double sum = 0;
+  for (int shift = 0; shift < kShifts; ++shift) {
+    lightFog(lamps, ray, (static_cast<float>(shift) + 0.5f) / kShifts, t, r, g, b);
+    for (const float v : r) sum += static_cast<double>(v) / kShifts;
+    EXPECT_NEAR(b[0], 0, 0);
+  }
+  EXPECT_NEAR(sum, truth, 2e-3 * truth);
+}
+
+TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
+  DenseVolume volume = makeProcedural(ProceduralKind::smoke, {.resolution = 32});
+  const auto grid = Grid::dense(volume.nx, volume.ny, volume.nz, std::move(volume.values), {});
+  const GridView view = grid->view();
+  const Vec3 o(3, 28, 1), d(0.31f, -0.4f, 0.47f);
+  float out[60];
+  lookupAlong(view, o, d, 60, out);
+  for (int n = 0; n < 60; ++n) EXPECT_NEAR(out[n], view.lookup(o + d * static_cast<float>(n)), 1e-4f) << n;
+}
+
+// Tables of optical depths are near those that marching finds, from lights in the plume and on the floor.
+TEST(FrameLights, TablesKnowTheMedia) {
+  const SceneSnapshot scene = sceneOf(plume(8));
+  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}),
+                           {.most = 200, .shadows = FrameLights::ShadowMapping::none}, {});
+  ASSERT_GT(lights.lights().size(), 100u);
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  std::vector<float> x, y, z, none(64, 0.f), seen(64);
+  for (int i = 0; i < 64; ++i)
+    x.push_back(-0.9f + 0.6f * static_cast<float>(i % 4)), y.push_back(-0.9f + 0.6f * static_cast<float>(i / 4 % 4)),
+        z.push_back(-0.8f + 0.6f * static_cast<float>(i / 16));
+  const KernelReceivers to{64,          x.data(),    y.data(),    z.data(),    none.data(), none.data(),
+                           none.data(), none.data(), none.data(), none.data(), none.data()};
+  double error = 0, sum = 0;
+  for (size_t l = 0; l < lights.lights().size(); ++l) {
+    float* out[3] = {seen.data(), seen.data(), seen.data()};
+    lights.lookFrom(l, to, EndKind::isotropic, out);
+    const Vec3 from = lights.lights()[l].vertex->p + lights.lights()[l].vertex->normal * 1e-3f;
+    const MediaState media = mediaAt(*scene, from);
+    for (size_t i = 0; i < 64; ++i) {
+      const Vec3 way = Vec3(x[i], y[i], z[i]) - from;
+      const float d = length(way);
+      const float truth = marchedTransmittance(scene->view, rays, {{from, way / d}, media, 0}, d, 128, 0).g;
+      error += static_cast<double>(std::fabs(seen[i] - truth));
+      sum += static_cast<double>(truth);
+    }
+  }
+  EXPECT_LT(error, 0.06 * sum);
+}
+
+}  // namespace
+}  // namespace virga

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+
+namespace virga::testing {
+
+// Scenes of size x size pixels, as elements; the camera stands at x.
+
+/// A plume over a floor, beside a block, under a point light.
+std::string plume(int size, float x = 0);
+
+/// Fog in a room with a lamp on the ceiling and a ball of `bsdf`.
+std::string fog(int size, const std::string& bsdf = R"(<bsdf type="diffuse"/>)", float x = 0);
+
+}  // namespace virga::testing
