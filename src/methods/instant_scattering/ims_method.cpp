@@ -14,13 +14,11 @@ class ImsMethod final : public Method {
     scene_ = std::move(scene);
     settings_ = ImsSettings(settings);
     seed_ = settings.seed;
-    refuse();
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
     scene_ = std::move(next);
     upsampling_ = nullptr;
-    refuse();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -51,7 +49,11 @@ class ImsMethod final : public Method {
   static constexpr uint64_t kWalkSeed = 0x6c62272e07bb0142ull;
 
   void exactPass(const ImsPixels& pixels, SampleId id, std::stop_token stop, PassFrame& frame) const {
-    forEachPixel(frame, stop, [&](int x, int y) { frame.set(x, y, pixels.sample(x, y, of(id, x, y))); });
+    forEachPixel(frame, stop, [&](int x, int y) {
+      LayerRadiance radiance = pixels.sample(x, y, of(id, x, y));
+      radiance += pixels.sampleGlow(x, y, of(id, x, y));
+      frame.set(x, y, radiance);
+    });
   }
 
   /// Light of x1 alone in each pixel; what else there is, at the coarse pixels, and from them everywhere.
@@ -76,6 +78,7 @@ class ImsMethod final : public Method {
         radiance.value[static_cast<int>(kOnSurface[l])] = found.surface[l];
         radiance.value[static_cast<int>(kInMedia[l])] = found.media[l];
       }
+      radiance += pixels.sampleGlow(x, y, of(id, x, y));
       frame.set(x, y, radiance);
     });
   }
@@ -106,10 +109,6 @@ class ImsMethod final : public Method {
       overlay.dots.push_back({v.p, v.kind == VertexKind::surface ? Rgb(0, 1, 0) : Rgb(1, 0, 0)});
     }
     return overlay;
-  }
-  void refuse() const {
-    if (scene_->view.emissive)
-      throw Error("method \"ims\" does not carry the light of media that glow", {{}, "render with --method path", {}});
   }
 
   /// The layers of Upsampling::Light.
