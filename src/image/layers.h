@@ -47,6 +47,10 @@ struct LayerRadiance {
   Rgb value[kLayerCount];
 
   VIRGA_HD void add(Layer layer, Rgb radiance) { value[static_cast<int>(layer)] += radiance; }
+  VIRGA_HD LayerRadiance& operator+=(const LayerRadiance& o) {
+    for (int l = 0; l < kLayerCount; ++l) value[l] += o.value[l];
+    return *this;
+  }
   VIRGA_HD Rgb sum() const {
     Rgb total;
     for (const Rgb& v : value) total += v;

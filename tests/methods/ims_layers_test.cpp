@@ -147,6 +147,23 @@ TEST(ImsLayers, OverlappingMedia) {
                                                    {Layer::mediaToMedia, 0.015}});
 }
 
+/// A lamp and a ball that glows, in fog that glows a little.
+TEST(ImsLayers, MediaThatGlow) {
+  World w = fogInRoom();
+  w.regions[0].medium.emission = {0.02, 0.05, 0.1};
+  w.regions.push_back(
+      ballAt({0.3, -0.4, -0.3}, 0.3, {.sigmaT = 2, .albedo = {0.5, 0.5, 0.5}, .emission = {3, 1, 0.3}}));
+  expectImsIsPath(elementsOf(w),
+                  {{Layer::emission, 0.025},
+                   {Layer::directSurface, 0.015},
+                   {Layer::directMedia, 0.005},
+                   {Layer::surfaceToSurface, 0.035},
+                   {Layer::mediaToSurface, 0.025},
+                   {Layer::surfaceToMedia, 0.01},
+                   {Layer::mediaToMedia, 0.01}},
+                  {.sets = 12}, {.radii = {0.25, 1}});
+}
+
 // --- the longest path ---
 
 // Without the right count of segments a depth would be missing or be there twice.

@@ -75,7 +75,7 @@ class Compensation {
       goesOn = tracer_.extend(path, sampler);
       if (record.vertex.kind != VertexKind::none) gather(record, path, before, sampler, level);
     }
-    for (int l = 0; l < kLayerCount; ++l) radiance.value[l] += path.radiance.value[l];
+    radiance += path.radiance;
   }
   void gather(const Record& at, Path& path, int events, Sampler& sampler, int level) const {
     const bool last = options_.levels >= 0 && level >= options_.levels;

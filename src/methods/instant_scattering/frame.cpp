@@ -110,6 +110,7 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
     radiance.add(Layer::mediaToSurface, found.surface[1]);
     radiance.add(Layer::surfaceToMedia, found.media[0]);
     radiance.add(Layer::mediaToMedia, found.media[1]);
+    radiance += paths.sampleGlow(x, y, idOf(x, y));
     frame.set(x, y, radiance);
   });
   return !stop.stop_requested();

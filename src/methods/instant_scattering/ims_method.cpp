@@ -12,7 +12,6 @@ class ImsMethod final : public Method {
     scene_ = std::move(scene);
     settings_ = ImsSettings(settings);
     seed_ = settings.seed;
-    refuse();
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
@@ -20,7 +19,6 @@ class ImsMethod final : public Method {
     upsampling_ = nullptr;
     points_ = {};
     renderer_.forget(changes);
-    refuse();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -62,7 +60,11 @@ class ImsMethod final : public Method {
   static constexpr uint64_t kWalkSeed = 0x6c62272e07bb0142ull;
 
   void exactPass(const ImsPixels& pixels, SampleId id, std::stop_token stop, PassFrame& frame) const {
-    forEachPixel(frame, stop, [&](int x, int y) { frame.set(x, y, pixels.sample(x, y, of(id, x, y))); });
+    forEachPixel(frame, stop, [&](int x, int y) {
+      LayerRadiance radiance = pixels.sample(x, y, of(id, x, y));
+      radiance += pixels.sampleGlow(x, y, of(id, x, y));
+      frame.set(x, y, radiance);
+    });
   }
 
   /// Light of x1 alone in each pixel; what else there is, at the coarse pixels, and from them everywhere.
@@ -87,6 +89,7 @@ class ImsMethod final : public Method {
         radiance.value[static_cast<int>(kOnSurface[l])] = found.surface[l];
         radiance.value[static_cast<int>(kInMedia[l])] = found.media[l];
       }
+      radiance += pixels.sampleGlow(x, y, of(id, x, y));
       frame.set(x, y, radiance);
     });
   }
@@ -117,10 +120,6 @@ class ImsMethod final : public Method {
       overlay.dots.push_back({v.p, v.kind == VertexKind::surface ? Rgb(0, 1, 0) : Rgb(1, 0, 0)});
     }
     return overlay;
-  }
-  void refuse() const {
-    if (scene_->view.emissive)
-      throw Error("method \"ims\" does not carry the light of media that glow", {{}, "render with --method path", {}});
   }
 
   /// The layers of Upsampling::Light.

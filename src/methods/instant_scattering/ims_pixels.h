@@ -13,7 +13,7 @@ namespace virga {
 /// The scene and the lights must outlive it.
 class ImsPixels {
  public:
-  /// All layers, or without those that virtual lights light: x1 alone.
+  /// The light of lamps in all layers, or without those that virtual lights light: x1 alone.
   enum class Part { all, direct };
 
   ImsPixels(const Scene& scene, const VirtualLights& lights, const LightVisibilityView& visibility,
@@ -21,7 +21,10 @@ class ImsPixels {
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         options_(options),
-        tracer_(scene_.view, rays_, options_.path),
+        lampPaths_(of(options.path, PathOptions::Sources::lamps)),
+        glowPaths_(of(options.path, PathOptions::Sources::glow)),
+        tracer_(scene_.view, rays_, lampPaths_),
+        glowTracer_(scene_.view, rays_, glowPaths_),
         gatherer_(scene_.view, rays_, lights, visibility, options_.gather),
         compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
         marched_(scene_.view, rays_) {}
@@ -66,9 +69,22 @@ class ImsPixels {
     }
     return path.radiance;
   }
+  /// The light of media that glow, which virtual lights do not carry, in all layers: by paths of its own.
+  LayerRadiance sampleGlow(int x, int y, SampleId id) const {
+    if (!scene_.view.emissive || options_.path.maxDepth == 0 || options_.show != ImsOptions::Show::picture) return {};
+    id.seed ^= kGlowSeed;
+    Sampler sampler(id);
+    return glowTracer_.trace(sampleCameraRay(scene_, x, y, sampler), sampler);
+  }
 
  private:
   using Tracer = PathTracer<EmbreeRays>;
+
+  static constexpr uint64_t kGlowSeed = 0x2f8b4a91d6e05c37ull;  // keeps its random numbers apart
+  static PathOptions of(PathOptions path, PathOptions::Sources sources) {
+    path.sources = sources;
+    return path;
+  }
 
   void lightVertex(const Tracer::Record& at, int events, Tracer::Path& path, Sampler& sampler) const {
     KnownSpace known;
@@ -81,7 +97,9 @@ class ImsPixels {
   const Scene& scene_;
   EmbreeRays rays_;
   ImsOptions options_;
+  PathOptions lampPaths_, glowPaths_;
   Tracer tracer_;                          ///< refers to the members above
+  Tracer glowTracer_;                      ///< likewise
   Gatherer<EmbreeRays> gatherer_;          ///< likewise
   Compensation<EmbreeRays> compensation_;  ///< likewise
   MarchedLight<EmbreeRays> marched_;       ///< likewise

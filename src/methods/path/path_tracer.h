@@ -10,10 +10,14 @@
 namespace virga {
 
 struct PathOptions {
+  /// What light is looked for. Lamps: all but media that glow.
+  enum class Sources { all, lamps, glow };
+
   int maxDepth = -1;  ///< segments; -1: no limit
   int rrDepth = 5;    ///< scattering events before Russian roulette
   int equiangularDepth =
       1;  ///< segments on which technique B aims at all lights; at small ones and those in thin fog it always does
+  Sources sources = Sources::all;
 };
 
 /// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
@@ -27,7 +31,12 @@ template <class Rays>
 class PathTracer {
  public:
   VIRGA_HD PathTracer(const SceneView& scene, const Rays& rays, const PathOptions& options)
-      : scene_(scene), rays_(rays), options_(options), aims_(hasLightsToAimAt(scene)) {}
+      : scene_(scene),
+        rays_(rays),
+        options_(options),
+        lamps_(options.sources != PathOptions::Sources::glow),
+        glow_(scene.emissive && options.sources != PathOptions::Sources::lamps),
+        aims_(lamps_ && hasLightsToAimAt(scene)) {}
 
   /// How the last vertex chose the ray's direction: what multiple importance sampling needs when the ray meets a light.
   struct LastVertex {
@@ -104,12 +113,12 @@ class PathTracer {
       collision = scene_.chromatic ? sampleCollision(scene_, walk, t0, t1, sampler.stream(), spectral)
                                    : sampleCollision(scene_, walk, t0, t1, sampler.stream());
       // What glows before a free flight's end counts in full: in expectation that is the transmittance.
-      if (scene_.emissive) glow += estimateEmission(scene_, walk, t0, std::min(t1, collision.t), sampler.stream());
+      if (glow_) glow += estimateEmission(scene_, walk, t0, std::min(t1, collision.t), sampler.stream());
       return !collision.found();
     });
     if (segment.active() && mayScatter(path)) connectEquiangular(path, segment, segmentMedia, sampler);
     if (scene_.chromatic) path.throughput *= spectral.weight(path.throughput);
-    if (scene_.emissive) path.add(path.layers, glow);
+    if (glow_) path.add(path.layers, glow);
     if (collision.found()) return scatterInMedium(path, walk.media, collision, segment, sampler);
     if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
     addEnvironment(path);
@@ -166,7 +175,7 @@ class PathTracer {
   }
 
   VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
-    const bool largeLights = path.depth < options_.equiangularDepth;
+    const bool largeLights = lamps_ && path.depth < options_.equiangularDepth;
     if (r.media.count() != 1 || !(largeLights || aims_)) return {};
     const int index = r.media.medium(0);
     const MediumView& medium = scene_.media[index];
@@ -188,7 +197,7 @@ class PathTracer {
   // --- light that the path meets ---
 
   VIRGA_HD void addEnvironment(Path& path) const {
-    if (scene_.environment < 0) return;
+    if (scene_.environment < 0 || !lamps_) return;
     const EmitterView& emitter = scene_.emitters[scene_.environment];
     const Vec3 w = path.at.ray.d;
     const float connection = scene_.emitterChoice.probability(scene_.environment) * environmentPdf(emitter, w);
@@ -239,7 +248,7 @@ class PathTracer {
   }
 
   VIRGA_HD bool hasLights() const {
-    return scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
+    return lamps_ && scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
   }
 
   /// Technique B: a vertex on the segment by its angle about a point on a light, connected to that point.
@@ -353,7 +362,7 @@ class PathTracer {
   VIRGA_HD bool scatterOnSurface(Path& path, const MediaState& media, const RayHit& hit, Sampler& sampler) const {
     const ShapeView& shape = scene_.surfaces[hit.shape];
     const SurfacePoint point = surfacePoint(shape, path.at.ray, hit, scene_.scale);
-    if (shape.emitter >= 0) addAreaLight(path, point, hit);
+    if (shape.emitter >= 0 && lamps_) addAreaLight(path, point, hit);
     if (!mayScatter(path) && !scene_.thinGlass) return false;
     const Vec3 wo = -path.at.ray.d;
     Bsdf textured;
@@ -423,6 +432,7 @@ class PathTracer {
   const SceneView& scene_;
   const Rays& rays_;
   const PathOptions& options_;
+  bool lamps_, glow_;  ///< does their light count?
   bool aims_;
 };
 
