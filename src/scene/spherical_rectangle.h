@@ -29,6 +29,9 @@ class SphericalRectangle {
     x0_ = dot(d, x_), y0_ = dot(d, y_), z0_ = dot(d, z_);
     if (z0_ > 0) z_ = -z_, z0_ = -z0_;
     x1_ = x0_ + lengthX, y1_ = y0_ + lengthY;
+    const float nearX = std::fmax(0.f, std::fmax(x0_, -x1_)), nearY = std::fmax(0.f, std::fmax(y0_, -y1_));
+    const float nearest2 = nearX * nearX + nearY * nearY + z0_ * z0_;
+    if (lengthX * lengthY * -z0_ < 0.9f * kSmallest * nearest2 * std::sqrt(nearest2)) return;  // not usable
     // z components of the unit normals of the planes through the point and an edge.
     const float below = -y0_ / std::sqrt(z0_ * z0_ + y0_ * y0_), right = x1_ / std::sqrt(z0_ * z0_ + x1_ * x1_);
     const float above = y1_ / std::sqrt(z0_ * z0_ + y1_ * y1_), left = -x0_ / std::sqrt(z0_ * z0_ + x0_ * x0_);
@@ -60,7 +63,7 @@ class SphericalRectangle {
 
   Vec3 origin_, x_, y_, z_;
   float x0_, x1_, y0_, y1_, z0_;
-  float below_, above_, shift_, solidAngle_;
+  float below_ = 0, above_ = 0, shift_ = 0, solidAngle_ = 0;
 };
 
 }  // namespace virga

@@ -4,6 +4,7 @@
 #include "core/sampler.h"
 #include "image/layers.h"
 #include "transport/equiangular.h"
+#include "transport/lamp_guide.h"
 #include "transport/roulette.h"
 #include "transport/visibility.h"
 
@@ -27,6 +28,8 @@ struct PathOptions {
 ///   B  a point on a light, then an equiangular distance (first medium on the ray if homogeneous; lights at finite
 ///   distance); C  free flight to the vertex, then the phase function, which meets the light.
 /// At a surface vertex: A' a point on a light, C' the BSDF.
+/// In fog around a lamp directions are guided (LampGuide). The weights are those of unguided ones: they need only sum
+/// to 1.
 template <class Rays>
 class PathTracer {
  public:
@@ -72,6 +75,8 @@ class PathTracer {
     Record* record = nullptr;  ///< where to write down vertices that virtual lights can light; null: nowhere
     float bound = 0;           ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
     Link link;
+    LampGuide lamp;                ///< of the last vertex, for technique B on the next segment
+    float guided = 1, before = 1;  ///< what guides did to the throughput at the last vertex and at the one before
 
     VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
   };
@@ -137,7 +142,7 @@ class PathTracer {
     path.at.ray.d = -v.wo;
     path.layers.scatter(VertexKind::surface);
     connectSurface(path, v.point, side, v.media, sampler);
-    const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    const BsdfSample s = sampleBsdf(path, v.point, side, v.media, sampler);
     return leave(path, v.point, side, s, v.media, sampler);
   }
 
@@ -251,16 +256,35 @@ class PathTracer {
     return lamps_ && scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
   }
 
+  VIRGA_HD LampGuide drawLamp(const Path& path, Sampler& sampler) const {
+    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
+    const EmitterView& emitter = scene_.emitters[choice.index];
+    const Vec2 u = pair(path, sampler);
+    LampGuide lamp;
+    lamp.emitter = choice.index, lamp.choice = choice.probability;
+    if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
+    return lamp;
+  }
+  /// For a ray that leaves x into these media: it is guided where the lamp lies in the same fog.
+  VIRGA_HD LampGuide guideFrom(const Path& path, const MediaState& media, Vec3 x, Sampler& sampler) const {
+    if (!aims_ || media.count() != 1 || !hasLights()) return {};
+    LampGuide lamp = drawLamp(path, sampler);
+    const EmitterView& emitter = scene_.emitters[lamp.emitter];
+    const Vec3 toLamp = lamp.on.p - x;
+    lamp.guides = emitter.isLocal() && emitter.medium == media.medium(0) && lengthSquared(toLamp) > 0;
+    if (lamp.guides) lamp.axis = normalize(toLamp);
+    return lamp;
+  }
+
   /// Technique B: a vertex on the segment by its angle about a point on a light, connected to that point.
   VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media,
                                    Sampler& sampler) const {
     if (!hasLights()) return;
-    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
-    const EmitterView& emitter = scene_.emitters[choice.index];
-    const Vec2 u = pair(path, sampler);
+    const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, sampler);
+    const EmitterView& emitter = scene_.emitters[lamp.emitter];
+    const LightPoint& on = lamp.on;
     const float uDistance = one(path, sampler);
     if (!segment.aimsAt(emitter)) return;
-    const LightPoint on = sampleLightPoint(scene_, emitter, u);
     const EquiangularSegment::Sample distance = segment.sample(on.p, uDistance);
     if (!(distance.pdf > 0)) return;
     const Vec3 x = segment.ray.at(distance.t), wo = -segment.ray.d;
@@ -271,13 +295,14 @@ class PathTracer {
     const MediumView& medium = scene_.media[segment.medium];
     const PhaseFunction phase = medium.phaseAt(x);
     const float flight = segment.freeFlightPdf(distance.t);
-    const float own = choice.probability * distance.pdf * light.pdf;
-    const float connected = segment.replacesFlights(emitter) ? 0 : flight * choice.probability;
+    const float own = lamp.choice * distance.pdf * light.pdf;
+    const float connected = segment.replacesFlights(emitter) ? 0 : flight * lamp.choice;
     float w = 1;
     if (light.delta) {
       w = weight(own, connected);
     } else {
-      const float connection = areaLightPdf(scene_.surfaces[emitter.shape], emitter, x, on.p, on.normal);
+      const ShapeView& shape = scene_.surfaces[emitter.shape];
+      const float connection = connected > 0 ? areaLightPdf(shape, emitter, x, on.p, on.normal) : 0;
       w = weight(own, connected * connection, flight * phase.pdf(wo, light.wi));
     }
     LayerPath layers = path.layers;
@@ -350,8 +375,17 @@ class PathTracer {
     path.last = last;
     connectMedium(path, phase, media, x, wo, sampler);
 
-    const PhaseSample s = phase.sample(wo, pair(path, sampler));
-    path.throughput *= s.value / s.pdf;
+    path.lamp = guideFrom(path, media, x, sampler);
+    PhaseSample s;
+    if (path.lamp.guides && one(path, sampler) < LampGuide::kShare) {
+      s.wi = path.lamp.sample(Vec3(0), pair(path, sampler));
+      s.value = phase.value(wo, s.wi), s.pdf = phase.pdf(wo, s.wi);
+    } else {
+      s = phase.sample(wo, pair(path, sampler));
+    }
+    if (!(s.pdf > 0)) return false;
+    path.guided = path.lamp.share(s.pdf, Vec3(0), s.wi);
+    path.throughput *= s.value / s.pdf * path.guided;
     path.last.pdf = s.pdf;
     path.at = {{x, s.wi}, media, 0};
     path.tMax = kInfinity;
@@ -390,8 +424,28 @@ class PathTracer {
       path.layers.scatter(VertexKind::surface);
       connectSurface(path, point, side, media, sampler);
     }
-    const BsdfSample s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    const BsdfSample s = sampleBsdf(path, point, side, media, sampler);
     return leave(path, point, side, s, media, sampler);
+  }
+
+  /// A direction by the bsdf, or by the guide.
+  VIRGA_HD BsdfSample sampleBsdf(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
+                                 Sampler& sampler) const {
+    path.lamp = side.bsdf->broad() ? guideFrom(path, media, point.p, sampler) : LampGuide{};
+    path.guided = 1;
+    if (!path.lamp.guides) return side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    const Vec3 n = dot(point.geometricNormal, path.at.ray.d) < 0 ? point.geometricNormal : -point.geometricNormal;
+    BsdfSample s;
+    if (one(path, sampler) < LampGuide::kShare) {
+      s.wi = side.frame.toLocal(path.lamp.sample(n, pair(path, sampler)));
+      s.pdf = side.bsdf->pdf(side.wo, s.wi);
+      if (s.pdf > 0) s.weight = side.bsdf->value(side.wo, s.wi) * (std::fabs(s.wi.z) / s.pdf);
+    } else {
+      s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    }
+    path.guided = s.pdf > 0 ? path.lamp.share(s.pdf, n, side.frame.toWorld(s.wi)) : 1;
+    s.weight *= path.guided;
+    return s;
   }
 
   /// Goes on from a surface as the bsdf has sampled it.
@@ -422,8 +476,10 @@ class PathTracer {
   }
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
+    // A guide makes the throughput small where the light that follows is bright: roulette looks past that.
+    const float unguided = path.guided * std::exchange(path.before, path.guided);
     if (path.depth < options_.rrDepth) return true;
-    const float q = std::min(maxComponent(path.throughput) * path.etaScale, mostSurvival(path.depth));
+    const float q = std::min(maxComponent(path.throughput) * path.etaScale / unguided, mostSurvival(path.depth));
     if (!(sampler.random() < q)) return false;
     path.throughput *= 1 / q;
     return true;
