@@ -37,7 +37,7 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   }
   if (!(begin < end) || !(thickest > 0)) return true;
   // A stretch without end is dark beyond so many mean free paths.
-  end = std::min(end, begin + 40 / thickest);
+  if (std::isinf(end)) end = begin + 40 / thickest;
   if (homogeneous) steps = 1, shift = 0;
   const float step = (end - begin) / static_cast<float>(steps);
   const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };

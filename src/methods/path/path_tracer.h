@@ -265,14 +265,17 @@ class PathTracer {
     if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
     return lamp;
   }
-  /// For a ray that leaves x into these media: it is guided where the lamp lies in the same fog.
+  /// For a ray that leaves x into these media: it is guided where the lamp lies in the same fog, and not too deep.
   VIRGA_HD LampGuide guideFrom(const Path& path, const MediaState& media, Vec3 x, Sampler& sampler) const {
     if (!aims_ || media.count() != 1 || !hasLights()) return {};
     LampGuide lamp = drawLamp(path, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
+    const MediumView& fog = scene_.media[media.medium(0)];
+    if (!emitter.isLocal() || emitter.medium != media.medium(0) || !fog.homogeneous) return lamp;
     const Vec3 toLamp = lamp.on.p - x;
-    lamp.guides = emitter.isLocal() && emitter.medium == media.medium(0) && lengthSquared(toLamp) > 0;
-    if (lamp.guides) lamp.axis = normalize(toLamp);
+    const float d = length(toLamp);
+    lamp.guides = d > 0 && fog.sigmaT * d < EquiangularSegment::kThin;
+    if (lamp.guides) lamp.axis = toLamp / d;
     return lamp;
   }
 
