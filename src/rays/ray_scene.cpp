@@ -4,118 +4,15 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <variant>
 
 #include "core/error.h"
+#include "rays/analytic.h"
 
 namespace virga {
 namespace {
-
-struct Sphere {
-  Vec3 center;
-  float radius;
-};
-struct Disk {
-  Vec3 center, normal;
-  float radius;
-};
-struct Cylinder {
-  Vec3 end, axis;
-  float radius, length;
-};
-struct Box {
-  Affine toLocal;
-};
-using Analytic = std::variant<Sphere, Disk, Cylinder, Box>;
-
-/// One point where a line meets an analytic shape.
-struct LineHit {
-  float t;
-  bool entering;
-};
-struct LineHits {
-  LineHit hit[2];
-  int count = 0;
-};
-
-// In double precision: far away, the discriminant of a small sphere cancels in float.
-LineHits intersect(const Sphere& s, Vec3 o, Vec3 d) {
-  const double ox = double{o.x} - double{s.center.x}, oy = double{o.y} - double{s.center.y},
-               oz = double{o.z} - double{s.center.z};
-  const double dx = d.x, dy = d.y, dz = d.z;
-  const double a = dx * dx + dy * dy + dz * dz;
-  const double b = ox * dx + oy * dy + oz * dz;
-  // Squared distance from the centre to the line, without the cancellation of b^2 - a c.
-  const double px = ox - b / a * dx, py = oy - b / a * dy, pz = oz - b / a * dz;
-  const double r2 = double{s.radius} * double{s.radius};
-  const double discriminant = a * (r2 - (px * px + py * py + pz * pz));
-  if (!(discriminant > 0)) return {};
-  const double root = std::sqrt(discriminant);
-  return {{{static_cast<float>((-b - root) / a), true}, {static_cast<float>((-b + root) / a), false}}, 2};
-}
-
-LineHits intersect(const Disk& k, Vec3 o, Vec3 d) {
-  const float along = dot(k.normal, d);
-  if (along == 0) return {};
-  const float t = dot(k.normal, k.center - o) / along;
-  if (!(lengthSquared(o + d * t - k.center) <= k.radius * k.radius)) return {};
-  return {{{t, along < 0}, {}}, 1};
-}
-
-// In double precision, for the same reason as the sphere: in the plane across the axis, a circle.
-LineHits intersect(const Cylinder& c, Vec3 o, Vec3 d) {
-  const double axis[] = {double{c.axis.x}, double{c.axis.y}, double{c.axis.z}};
-  const double from[] = {double{o.x} - double{c.end.x}, double{o.y} - double{c.end.y}, double{o.z} - double{c.end.z}};
-  const double to[] = {double{d.x}, double{d.y}, double{d.z}};
-  const auto inner = [](const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
-  const double unit = inner(axis, axis), height = inner(from, axis) / unit, climb = inner(to, axis) / unit;
-  double p[3], q[3];
-  for (int i = 0; i < 3; ++i) p[i] = from[i] - height * axis[i], q[i] = to[i] - climb * axis[i];
-  const double a = inner(q, q), b = inner(p, q);
-  if (!(a > 0)) return {};
-  double nearest[3];
-  for (int i = 0; i < 3; ++i) nearest[i] = p[i] - b / a * q[i];
-  const double discriminant = a * (double{c.radius} * double{c.radius} - inner(nearest, nearest));
-  if (!(discriminant > 0)) return {};
-  const double root = std::sqrt(discriminant);
-  LineHits hits;
-  for (const double side : {-1.0, 1.0}) {
-    const double t = (-b + side * root) / a, z = height + t * climb;
-    if (z >= 0 && z <= double{c.length}) hits.hit[hits.count++] = {static_cast<float>(t), side < 0};
-  }
-  return hits;
-}
-
-LineHits intersect(const Box& box, Vec3 o, Vec3 d) {
-  const Vec3 lo = box.toLocal.point(o), ld = box.toLocal.vector(d);
-  float tEnter = -kInfinity, tLeave = kInfinity;
-  for (int axis = 0; axis < 3; ++axis) {
-    const float inverse = 1 / ld[axis];
-    const float t0 = (-1 - lo[axis]) * inverse, t1 = (1 - lo[axis]) * inverse;
-    if (ld[axis] == 0) {
-      if (std::fabs(lo[axis]) >= 1) return {};
-      continue;
-    }
-    tEnter = std::max(tEnter, std::min(t0, t1));
-    tLeave = std::min(tLeave, std::max(t0, t1));
-  }
-  if (!(tEnter < tLeave)) return {};
-  return {{{tEnter, true}, {tLeave, false}}, 2};
-}
-
-Bounds boundsOf(const Sphere& s) { return {s.center - Vec3(s.radius), s.center + Vec3(s.radius)}; }
-
-Bounds boundsOf(const Disk& k) {
-  const auto half = [&](float n) { return k.radius * std::sqrt(std::max(0.f, 1 - n * n)); };
-  const Vec3 h(half(k.normal.x), half(k.normal.y), half(k.normal.z));
-  return {k.center - h, k.center + h};
-}
-
-Bounds boundsOf(const Cylinder& c) {
-  Bounds b = boundsOf(Disk{c.end, c.axis, c.radius});
-  b.extend(boundsOf(Disk{c.end + c.axis * c.length, c.axis, c.radius}));
-  return b;
-}
 
 struct DeviceHolder {
   RTCDevice device = rtcNewDevice(nullptr);
@@ -140,7 +37,7 @@ void requireNoError() {
 
 struct RayShape::Impl {
   RTCGeometry geometry = nullptr;
-  std::variant<std::monostate, Sphere, Disk, Cylinder, Box> analytic;
+  analytic::Shape analytic;
   Bounds bounds;  ///< of an analytic shape
 
   ~Impl() { rtcReleaseGeometry(geometry); }
@@ -148,15 +45,30 @@ struct RayShape::Impl {
 
 namespace {
 
+/// The numbers of a scene's shapes, by where they are sorted: the standing ones, and each that moved.
+struct ShapeNumbers {
+  std::vector<uint32_t> standing, moved;
+
+  /// Those that stand are instance 0 of the top or, without a top, of none.
+  uint32_t of(uint32_t instance, uint32_t geometry) const {
+    const bool stands = instance == RTC_INVALID_GEOMETRY_ID || instance == 0;
+    return stands ? standing[geometry] : moved[instance - 1];
+  }
+};
+
 /// Extends Embree's context: where `list` is set, every hit goes there and none ends the ray.
 struct Context {
   RTCIntersectContext embree;
+  const ShapeNumbers* numbers = nullptr;
   CrossingList* list = nullptr;
+
+  /// The number of the shape that is being asked.
+  uint32_t shape(uint32_t geometry) const { return numbers->of(embree.instID[0], geometry); }
 };
 
-LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
+analytic::LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
   return std::visit(
-      [&](const auto& s) -> LineHits {
+      [&](const auto& s) -> analytic::LineHits {
         if constexpr (std::is_same_v<std::decay_t<decltype(s)>, std::monostate>)
           return {};
         else
@@ -167,7 +79,7 @@ LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
 
 void gatherAnalytic(const RayShape::Impl& shape, uint32_t index, const Ray& ray, float tMin, float tMax,
                     CrossingList& list) {
-  const LineHits hits = intersectAnalytic(shape, ray.o, ray.d);
+  const analytic::LineHits hits = intersectAnalytic(shape, ray.o, ray.d);
   for (int i = 0; i < hits.count; ++i)
     if (hits.hit[i].t >= tMin && hits.hit[i].t <= tMax) list.insert({hits.hit[i].t, index, hits.hit[i].entering});
 }
@@ -183,8 +95,8 @@ void boundsCallback(const RTCBoundsFunctionArguments* args) {
 }
 
 // Nearest of the shape's hits in the ray's open interval.
-LineHit nearestOf(const LineHits& hits, float tMin, float tMax) {
-  LineHit best{kInfinity, false};
+analytic::LineHit nearestOf(const analytic::LineHits& hits, float tMin, float tMax) {
+  analytic::LineHit best{kInfinity, false};
   for (int i = 0; i < hits.count; ++i)
     if (hits.hit[i].t > tMin && hits.hit[i].t < tMax && hits.hit[i].t < best.t) best = hits.hit[i];
   return best;
@@ -194,18 +106,19 @@ void intersectCallback(const RTCIntersectFunctionNArguments* args) {
   auto* rayHit = reinterpret_cast<RTCRayHit*>(args->rayhit);
   RTCRay& r = rayHit->ray;
   const Vec3 o(r.org_x, r.org_y, r.org_z), d(r.dir_x, r.dir_y, r.dir_z);
-  const LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), o, d);
+  const analytic::LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), o, d);
   auto* context = reinterpret_cast<Context*>(args->context);
   if (context->list) {
     for (int i = 0; i < hits.count; ++i)
       if (hits.hit[i].t >= r.tnear && hits.hit[i].t <= r.tfar)
-        context->list->insert({hits.hit[i].t, args->geomID, hits.hit[i].entering});
+        context->list->insert({hits.hit[i].t, context->shape(args->geomID), hits.hit[i].entering});
     return;
   }
-  const LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
+  const analytic::LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
   if (nearest.t == kInfinity) return;
   r.tfar = nearest.t;
   rayHit->hit.geomID = args->geomID;
+  rayHit->hit.instID[0] = args->context->instID[0];
   rayHit->hit.primID = args->primID;
   rayHit->hit.u = rayHit->hit.v = 0;
 }
@@ -230,13 +143,13 @@ void recordCrossing(const RTCFilterFunctionNArguments* args) {
   const auto* r = reinterpret_cast<const RTCRay*>(args->ray);
   const auto* h = reinterpret_cast<const RTCHit*>(args->hit);
   const bool entering = h->Ng_x * r->dir_x + h->Ng_y * r->dir_y + h->Ng_z * r->dir_z < 0;
-  context->list->insert({r->tfar, h->geomID, entering, onEdge(*r, *h)});
+  context->list->insert({r->tfar, context->shape(h->geomID), entering, onEdge(*r, *h)});
   args->valid[0] = 0;
 }
 
-std::shared_ptr<const RayShape> analyticShape(const Analytic& shape, const Bounds& bounds) {
+std::shared_ptr<const RayShape> analyticShape(const analytic::Shape& shape, const Bounds& bounds) {
   auto impl = std::make_unique<RayShape::Impl>();
-  std::visit([&](const auto& s) { impl->analytic = s; }, shape);
+  impl->analytic = shape;
   impl->bounds = bounds;
   impl->geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(impl->geometry, 1);
@@ -266,17 +179,17 @@ std::shared_ptr<const RayShape> RayShape::triangles(std::span<const Vec3> positi
 }
 
 std::shared_ptr<const RayShape> RayShape::sphere(Vec3 center, float radius) {
-  const Sphere s{center, radius};
+  const analytic::Sphere s{center, radius};
   return analyticShape(s, boundsOf(s));
 }
 
 std::shared_ptr<const RayShape> RayShape::disk(Vec3 center, Vec3 unitNormal, float radius) {
-  const Disk k{center, unitNormal, radius};
+  const analytic::Disk k{center, unitNormal, radius};
   return analyticShape(k, boundsOf(k));
 }
 
 std::shared_ptr<const RayShape> RayShape::cylinder(Vec3 end, Vec3 unitAxis, float radius, float length) {
-  const Cylinder c{end, unitAxis, radius, length};
+  const analytic::Cylinder c{end, unitAxis, radius, length};
   return analyticShape(c, boundsOf(c));
 }
 
@@ -284,31 +197,123 @@ std::shared_ptr<const RayShape> RayShape::box(const Matrix4& toWorld) {
   const Affine map(toWorld);
   Bounds bounds;
   for (int i = 0; i < 8; ++i) bounds.extend(map.point(Bounds{Vec3(-1), Vec3(1)}.corner(i)));
-  return analyticShape(Box{Affine(toWorld.inverse())}, bounds);
+  return analyticShape(analytic::Box{Affine(toWorld.inverse())}, bounds);
 }
 
+namespace {
+
+RTCScene newScene() {
+  const RTCScene scene = rtcNewScene(device());
+  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  return scene;
+}
+
+/// Shapes that are sorted together. Immutable, shared between scenes.
+struct Group {
+  RayScene::Shapes shapes;
+  RTCScene scene = newScene();
+
+  explicit Group(RayScene::Shapes of) : shapes(std::move(of)) {
+    for (size_t i = 0; i < shapes.size(); ++i)
+      rtcAttachGeometryByID(scene, shapes[i]->impl().geometry, static_cast<unsigned>(i));
+    rtcCommitScene(scene);
+  }
+  Group(const Group&) = delete;
+  Group& operator=(const Group&) = delete;
+  ~Group() { rtcReleaseScene(scene); }
+};
+using GroupPtr = std::shared_ptr<const Group>;
+
+constexpr uint32_t kGone = ~0u;
+
+// For each member of a group the number that it has among `shapes`, kGone if it is not there; marks those found. One
+// shape may be there several times.
+std::vector<uint32_t> findMembers(const Group& group, const RayScene::Shapes& shapes, std::vector<bool>& found) {
+  std::multimap<const RayShape*, uint32_t> numbers;
+  for (size_t i = shapes.size(); i-- > 0;) numbers.emplace(shapes[i].get(), static_cast<uint32_t>(i));
+  std::vector<uint32_t> result;
+  for (const auto& member : group.shapes) {
+    const auto number = numbers.find(member.get());
+    result.push_back(number == numbers.end() ? kGone : number->second);
+    if (number == numbers.end()) continue;
+    found[number->second] = true;
+    numbers.erase(number);
+  }
+  return result;
+}
+
+}  // namespace
+
 struct RayScene::Impl {
-  RTCScene scene = rtcNewScene(device());
+  GroupPtr standing;
+  std::vector<GroupPtr> moved;  ///< one shape each
+  ShapeNumbers numbers;
+  RTCScene top = nullptr;  ///< over all groups, if any shape moved
   /// Few analytic boundaries are quicker asked one by one than through a traversal.
   bool askOneByOne = false;
 
-  ~Impl() { rtcReleaseScene(scene); }
+  ~Impl() { rtcReleaseScene(top); }
+
+  RTCScene scene() const { return top ? top : standing->scene; }
+
+  void standAll(const Shapes& shapes) {
+    numbers.standing.clear();
+    standing = std::make_shared<const Group>(shapes);
+    for (size_t i = 0; i < shapes.size(); ++i) numbers.standing.push_back(static_cast<uint32_t>(i));
+  }
+
+  void takeFrom(const Impl& previous, const Shapes& shapes) {
+    std::vector<bool> stands(shapes.size());
+    numbers.standing = findMembers(*previous.standing, shapes, stands);
+    if (std::find(stands.begin(), stands.end(), true) == stands.end()) return standAll(shapes);
+    standing = previous.standing;
+    if (std::erase(numbers.standing, kGone) > 0) {
+      Shapes still;
+      for (const uint32_t number : numbers.standing) still.push_back(shapes[number]);
+      standing = std::make_shared<const Group>(std::move(still));
+    }
+    for (size_t i = 0; i < shapes.size(); ++i) {
+      if (stands[i]) continue;
+      numbers.moved.push_back(static_cast<uint32_t>(i));
+      const auto known = std::find_if(previous.moved.begin(), previous.moved.end(),
+                                      [&](const GroupPtr& g) { return g->shapes.front() == shapes[i]; });
+      moved.push_back(known == previous.moved.end() ? std::make_shared<const Group>(Shapes{shapes[i]}) : *known);
+    }
+    if (!moved.empty()) raiseTop();
+  }
+
+  void raiseTop() {
+    top = newScene();
+    addInstance(*standing, 0);
+    for (size_t i = 0; i < moved.size(); ++i) addInstance(*moved[i], 1 + static_cast<uint32_t>(i));
+    rtcCommitScene(top);
+  }
+
+  void addInstance(const Group& group, uint32_t id) const {
+    const RTCGeometry instance = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(instance, group.scene);
+    rtcCommitGeometry(instance);
+    rtcAttachGeometryByID(top, instance, id);
+    rtcReleaseGeometry(instance);
+  }
 };
 
-RayScene::RayScene(std::vector<std::shared_ptr<const RayShape>> shapes)
+RayScene::RayScene(Shapes shapes, const RayScene* previous)
     : shapes_(std::move(shapes)), impl_(std::make_unique<Impl>()) {
   constexpr size_t kFew = 4;
-  rtcSetSceneFlags(impl_->scene,
-                   static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   impl_->askOneByOne = shapes_.size() <= kFew;
-  for (size_t i = 0; i < shapes_.size(); ++i) {
-    const RayShape::Impl& shape = shapes_[i]->impl();
-    if (std::holds_alternative<std::monostate>(shape.analytic)) impl_->askOneByOne = false;
-    rtcAttachGeometryByID(impl_->scene, shape.geometry, static_cast<unsigned>(i));
-  }
-  rtcCommitScene(impl_->scene);
+  for (const auto& shape : shapes_)
+    if (std::holds_alternative<std::monostate>(shape->impl().analytic)) impl_->askOneByOne = false;
+  if (previous)
+    impl_->takeFrom(*previous->impl_, shapes_);
+  else
+    impl_->standAll(shapes_);
   requireNoError();
 }
+
+int RayScene::movedShapes() const { return static_cast<int>(impl_->moved.size()); }
+
+bool RayScene::sharesStandingShapes(const RayScene& other) const { return impl_->standing == other.impl_->standing; }
 
 RayScene::~RayScene() = default;
 
@@ -320,9 +325,9 @@ RayHit RayScene::nearest(const Ray& ray, float tMin, float tMax) const {
   q.ray = {ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &context.embree, &q);
+  rtcIntersect1(impl_->scene(), &context.embree, &q);
   if (q.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return {q.ray.tfar, q.hit.geomID, q.hit.primID, q.hit.u, q.hit.v};
+  return {q.ray.tfar, impl_->numbers.of(q.hit.instID[0], q.hit.geomID), q.hit.primID, q.hit.u, q.hit.v};
 }
 
 bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
@@ -330,7 +335,7 @@ bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
   Context context;
   rtcInitIntersectContext(&context.embree);
   RTCRay q{ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
-  rtcOccluded1(impl_->scene, &context.embree, &q);
+  rtcOccluded1(impl_->scene(), &context.embree, &q);
   return q.tfar < 0;
 }
 
@@ -345,11 +350,12 @@ void RayScene::crossings(const Ray& ray, float tMin, float tMax, CrossingList& l
   rtcInitIntersectContext(&context.embree);
   context.embree.filter = recordCrossing;
   context.list = &list;
+  context.numbers = &impl_->numbers;
   RTCRayHit q{};
   q.ray = {ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &context.embree, &q);
+  rtcIntersect1(impl_->scene(), &context.embree, &q);
 }
 
 }  // namespace virga
