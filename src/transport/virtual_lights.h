@@ -18,6 +18,9 @@ struct VirtualLights {
   int walks() const { return static_cast<int>(firstOf.size()) - 1; }
 };
 
+/// One list after the other.
+VirtualLights joined(const std::vector<VirtualLights>& parts);
+
 struct WalkOptions {
   int walks = 1024;
   int maxDepth = -1;  ///< scattering events; -1: no limit
@@ -40,10 +43,12 @@ class WalkStarts {
     Rgb flux;  ///< [W]; black if no walk leaves
   };
   Start sample(Sampler& sampler) const;
+  /// The medium that is around everything, or MediaState::kNone.
+  int endless() const { return endless_; }
 
  private:
   const Scene& scene_;
-  int endless_;  ///< index of the medium that is around everything, or MediaState::kNone
+  int endless_;
 };
 
 }  // namespace virga

@@ -4,6 +4,7 @@
 #include "methods/instant_scattering/ims_pixels.h"
 #include "methods/instant_scattering/upsampling.h"
 #include "methods/pixels.h"
+#include "transport/kept_walks.h"
 
 namespace virga {
 namespace {
@@ -18,6 +19,7 @@ class ImsMethod final : public Method {
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
+    walks_.edit(*scene_, *next, changes);
     scene_ = std::move(next);
     upsampling_ = nullptr;
     refuse();
@@ -33,9 +35,7 @@ class ImsMethod final : public Method {
     const ImsOptions options = settings_.forScene(*scene_);
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
-    const VirtualLights lights = traceVirtualLights(
-        *scene_, {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2)},
-        {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
+    const VirtualLights lights = lightsOf(index, options, {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
     const ImsPixels pixels(*scene_, lights, options);
     const SampleId id{seed_, replicate, 0, sample};
@@ -49,6 +49,13 @@ class ImsMethod final : public Method {
  private:
   /// Keeps the walks' random numbers apart from the pixels'.
   static constexpr uint64_t kWalkSeed = 0x6c62272e07bb0142ull;
+
+  VirtualLights lightsOf(int64_t pass, const ImsOptions& options, SampleId id, std::stop_token stop) {
+    const int maxDepth = options.path.maxDepth;
+    const WalkOptions walks{options.walks, maxDepth < 0 ? -1 : std::max(0, maxDepth - 2)};
+    if (options.retrace >= 1) return traceVirtualLights(*scene_, walks, id, stop);
+    return walks_.lights(*scene_, walks, id, pass, options.retrace, stop);
+  }
 
   void exactPass(const ImsPixels& pixels, SampleId id, std::stop_token stop, PassFrame& frame) const {
     forEachPixel(frame, stop, [&](int x, int y) { frame.set(x, y, pixels.sample(x, y, of(id, x, y))); });
@@ -117,6 +124,7 @@ class ImsMethod final : public Method {
   static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
 
   SceneSnapshot scene_;
+  WalkStore walks_;                         ///< from frame to frame, if any are kept
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
   Overlay overlay_;
   ImsSettings settings_;

@@ -11,6 +11,7 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"samples", "16", "fast: samples of each of these pixels in a pass"},
     {"spacing", "8", "fast: their distance in either direction [pixels]"},
     {"walks", "8192", "random walks from the lights in each pass"},
+    {"retrace", "1", "part of the walks that is traced anew in a frame where only media change; the others are kept"},
     {"lights", "8; 1 where a medium is heterogeneous",
      "single virtual lights that light a vertex, where no number of walks is given"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},

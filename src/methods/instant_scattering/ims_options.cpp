@@ -55,6 +55,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.samples = reader.integer("samples", 1).value_or(o.samples);
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   o.walks = reader.integer("walks", 1).value_or(o.walks);
+  o.retrace = reader.share("retrace").value_or(o.retrace);
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   o.compensate = static_cast<ImsOptions::Compensate>(reader.choice("compensation", kCompensate).value_or(0));
@@ -100,6 +101,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
+          {"retrace", fmt::format("{}", o.retrace)},
           {"lights", std::to_string(o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
           {"radius", fmt::format("{}", c.radius)},

@@ -16,6 +16,7 @@ struct ImsOptions {
   int samples = 16;  ///< fast: of a coarse pixel in each pass
   int spacing = 8;   ///< fast: of coarse pixels [pixels]
   int walks = 8192;
+  float retrace = 1;  ///< part of the walks that is traced anew in each frame; 1: all, and none is kept
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray
   GatherOptions gather;
