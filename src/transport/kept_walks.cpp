@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "scene/scene_parts.h"
+#include "transport/optical_depth.h"
 
 namespace virga {
 namespace {
@@ -178,18 +179,17 @@ class KeptWalker {
   int maxDepth_;
 };
 
-/// What a block's walks carry in a scene: the flux by the transmittance and sigma_s along all their segments.
-/// Transmittance is estimated by ratio tracking, with numbers that belong to the segment.
+/// What a block's walks carry in a scene: the flux by the transmittance and sigma_s along all their segments. Nothing
+/// in it is random: an estimate of transmittance would add its own noise at each scattering
+/// (docs/decisions/kept-walks.md).
 class Weigher {
  public:
   Weigher(const SceneView& scene, const KeptBlock& block) : scene_(scene), block_(block) {}
 
-  VirtualLights lights(const SampleId& id, int firstWalk) {
+  VirtualLights lights() {
     for (size_t w = 0; w < block_.walks.size(); ++w) {
       result_.firstOf.push_back(static_cast<uint32_t>(result_.lights.size()));
-      const uint32_t stream = static_cast<uint32_t>(firstWalk) + static_cast<uint32_t>(w);
-      const uint64_t seed = hash64(hash64(id.seed ^ (uint64_t{id.replicate} << 32 | id.index)) + stream);
-      weigh(block_.walks[w].flux, block_.walks[w].firstSegment, endOf(w), seed);
+      weigh(block_.walks[w].flux, block_.walks[w].firstSegment, endOf(w));
     }
     return std::move(result_);
   }
@@ -199,10 +199,10 @@ class Weigher {
     return walk + 1 < block_.walks.size() ? block_.walks[walk + 1].firstSegment : block_.segments.size();
   }
 
-  void weigh(Rgb flux, size_t first, size_t end, uint64_t seed) {
+  void weigh(Rgb flux, size_t first, size_t end) {
     for (size_t i = first; i < end && !isBlack(flux); ++i) {
       const KeptSegment& segment = block_.segments[i];
-      flux *= passed(i, seed + i - first) * segment.inverseDensity;
+      flux *= transmittance(i) * segment.inverseDensity;
       if (segment.medium >= 0) flux *= sigmaS(scene_.media[segment.medium], segment.ray.at(segment.length));
       if (segment.light >= 0) addLight(block_.lights[static_cast<size_t>(segment.light)], flux);
       flux *= segment.onward;
@@ -211,17 +211,16 @@ class Weigher {
 
   static Rgb sigmaS(const MediumView& medium, Vec3 p) { return medium.sigmaTAt(p) * medium.albedoAt(p); }
 
-  Rgb passed(size_t index, uint64_t seed) const {
+  Rgb transmittance(size_t index) const {
     const KeptSegment& segment = block_.segments[index];
     const size_t end =
         index + 1 < block_.segments.size() ? block_.segments[index + 1].firstPiece : block_.pieces.size();
-    Pcg32 random(seed);
-    Rgb transmittance(1.f);
-    for (size_t i = segment.firstPiece; i < end && !isBlack(transmittance); ++i) {
+    Rgb depth;
+    for (size_t i = segment.firstPiece; i < end; ++i) {
       const MediaPiece& p = block_.pieces[i];
-      transmittance *= estimateTransmittance(scene_.media[p.medium], segment.ray, p.t0, p.t1, random);
+      depth += opticalDepth(scene_.media[p.medium], segment.ray, p.t0, p.t1);
     }
-    return transmittance;
+    return exp(depth * -1.f);
   }
 
   void addLight(LightVertex v, Rgb flux) {
@@ -314,7 +313,7 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
       block = traceBlock(walker, starts, id, first, std::min(first + kBlock, options.walks));
       block.drawnIn = extinctions;
     }
-    parts[static_cast<size_t>(b)] = Weigher(scene.view, block).lights(id, first);
+    parts[static_cast<size_t>(b)] = Weigher(scene.view, block).lights();
   });
   return joined(parts);
 }
