@@ -56,10 +56,50 @@ std::vector<Rgb> meanExtinctions(const Scene& scene) {
   return result;
 }
 
-std::vector<DefensiveRates> defensiveRates(const Scene& scene, const std::vector<Rgb>& extinctions) {
+/// The media's rates, and what they point to.
+struct Defence {
   std::vector<DefensiveRates> rates;
-  for (const float extent : extents(scene)) rates.push_back({1 / extent, mean(extinctions[rates.size()])});
-  return rates;
+  std::vector<std::vector<float>> spread;
+};
+
+/// Means over each cell and those around it: where smoke may be a few frames later.
+std::vector<float> spreadOut(const CoarseGridView& cells) {
+  std::vector<float> result;
+  const auto range = [](int i, int n) { return std::pair(std::max(0, i - 1), std::min(n - 1, i + 1)); };
+  for (int k = 0; k < cells.nz; ++k)
+    for (int j = 0; j < cells.ny; ++j)
+      for (int i = 0; i < cells.nx; ++i) {
+        const auto [x0, x1] = range(i, cells.nx);
+        const auto [y0, y1] = range(j, cells.ny);
+        const auto [z0, z1] = range(k, cells.nz);
+        float sum = 0;
+        for (int z = z0; z <= z1; ++z)
+          for (int y = y0; y <= y1; ++y)
+            for (int x = x0; x <= x1; ++x) sum += cells.cell(x, y, z);
+        result.push_back(sum / 27);
+      }
+  return result;
+}
+
+/// Of the mean extinction, the floor under means that are spread.
+constexpr float kFloor = 0.7f;
+
+Defence defenceOf(const Scene& scene, const std::vector<Rgb>& extinctions) {
+  Defence defence;
+  const std::vector<float> across = extents(scene);
+  for (size_t m = 0; m < across.size(); ++m) {
+    const MediumView& medium = scene.view.media[static_cast<int>(m)];
+    const bool grid = !medium.homogeneous && medium.density.kind != GridView::Kind::constant;
+    DefensiveRates r{1 / across[m], mean(extinctions[m]) * (grid ? kFloor : 1), 0, {}};
+    defence.spread.push_back(grid ? spreadOut(medium.density.mean) : std::vector<float>());
+    if (grid) {
+      r.spreadRate = medium.sigmaT * mean(medium.spectrum);
+      r.spread = medium.density.mean;
+      r.spread.values = defence.spread.back().data();
+    }
+    defence.rates.push_back(r);
+  }
+  return defence;
 }
 
 /// Media may become so many times as dense until walks that were drawn in them before are too noisy to be kept. It is
@@ -301,8 +341,8 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
   frame_ = frame;
 
   const auto extinctions = std::make_shared<const std::vector<Rgb>>(meanExtinctions(scene));
-  const std::vector<DefensiveRates> rates = defensiveRates(scene, *extinctions);
-  const KeptWalker walker(scene, rates, options.maxDepth);
+  const Defence defence = defenceOf(scene, *extinctions);
+  const KeptWalker walker(scene, defence.rates, options.maxDepth);
   const WalkStarts starts(scene);
   std::vector<VirtualLights> parts(count);
   parallelFor(static_cast<int64_t>(count), 1, [&](int64_t b) {
