@@ -179,24 +179,25 @@ class KeptWalker {
   bool scatterOnSurface(State& state, KeptSegment& segment, const MediaState& media, const RayHit& hit,
                         Sampler& sampler, KeptBlock& block) const {
     const SurfaceBounce bounce = bounceOff(scene_, state.at.ray, media, hit, state.depth, sampler);
-    if (bounce.vertex.kind == VertexKind::surface && !isBlack(bounce.vertex.weight)) {
-      LightVertex v = bounce.vertex;
+    LightVertex v = bounce.vertex;
+    v.weight = bounce.left(Rgb(1.f));
+    if (v.kind == VertexKind::surface && !isBlack(v.weight)) {
       if (!bounce.lambertian) {
         v.surface = static_cast<int>(block.surfaces.size());
         block.surfaces.push_back(bounce.scattering);
       }
       addLight(v, segment, block);
     }
-    const Rgb next = state.expected * bounce.weight;
+    const Rgb next = bounce.carried(state.expected);
     if (isBlack(next)) return false;
     state.at = bounce.onward;
     if (bounce.passes) {
       state.expected = next;
-      segment.onward = bounce.weight;
+      segment.onward = bounce.carried(Rgb(1.f));
       return true;
     }
     ++state.depth;
-    return survives(state, segment, next, bounce.weight, sampler);
+    return survives(state, segment, next, bounce.carried(Rgb(1.f)), sampler);
   }
 
   static void addLight(const LightVertex& v, KeptSegment& segment, KeptBlock& block) {

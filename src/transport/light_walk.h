@@ -31,14 +31,23 @@ struct WalkNumbers {
   }
 };
 
-/// What a surface makes of a flux of 1 that arrives on it.
+/// What a surface makes of the flux that arrives on it.
 struct SurfaceBounce {
   LightVertex vertex;            ///< without a kind where no light is left: on narrow bsdfs (Bsdf::broad)
   SurfaceScattering scattering;  ///< of the vertex
   bool lambertian = false;       ///< then the vertex does without
+  float arrival = 1;             ///< |cosine| of the light to the geometry
   MediaRay onward;
-  Rgb weight;           ///< of the flux that goes on; black: the walk ends here
-  bool passes = false;  ///< straight through thin glass, which does not count as scattering
+  Rgb weight;                      ///< of the bsdf's sample; black: the walk ends here
+  float refraction = 1, tilt = 1;  ///< what makes it that of flux, and of the geometry's cosines
+  bool passes = false;             ///< straight through thin glass, which does not count as scattering
+
+  /// The weight of the vertex.
+  VIRGA_HD Rgb left(Rgb flux) const {
+    return lambertian ? flux / arrival * scattering.scattering(vertex.normal, vertex.wi) : flux / arrival;
+  }
+  /// The flux that goes on.
+  VIRGA_HD Rgb carried(Rgb flux) const { return flux * weight * refraction * tilt; }
 };
 
 /// Surfaces scatter light by the adjoint of their bsdf: no scaling of refracted radiance, corrected for shading normals
@@ -52,26 +61,25 @@ VIRGA_HD inline SurfaceBounce bounceOff(const SceneView& scene, const Ray& at, c
   const Side side = sideOf(scene, point, hit, wi, textured);
   const bool fromBehind = side.wo.z <= 0 && !side.bsdf->transmits();  // black, as one-sided bsdfs are there
   if (fromBehind || side.leaks(wi, side.wo)) return bounce;
-  const float arrival = std::fabs(dot(wi, point.geometricNormal));
+  bounce.arrival = std::fabs(dot(wi, point.geometricNormal));
   if (side.bsdf->broad()) {
     bounce.scattering = SurfaceScattering(side);
     LightVertex& v = bounce.vertex;
-    v.kind = VertexKind::surface, v.p = point.p, v.wi = wi, v.weight = Rgb(1 / arrival);
+    v.kind = VertexKind::surface, v.p = point.p, v.wi = wi;
     v.depth = depth + 1, v.normal = side.normal;
     bounce.lambertian = side.bsdf->kind() == Bsdf::Kind::diffuse && point.shadingNormal == point.geometricNormal;
-    if (bounce.lambertian) v.weight *= bounce.scattering.scattering(side.normal, wi);
   }
-  const Vec2 u = WalkNumbers::pair(depth, sampler);
-  const BsdfSample s = side.bsdf->sample(side.wo, u, WalkNumbers::one(depth, sampler));
+  const float choice = WalkNumbers::one(depth, sampler);
+  const BsdfSample s = side.bsdf->sample(side.wo, WalkNumbers::pair(depth, sampler), choice);
   if (!(s.pdf > 0) || isBlack(s.weight)) return bounce;
   const Vec3 w = side.frame.toWorld(s.wi);
   if (side.leaks(w, s.wi)) return bounce;
   bounce.passes = side.bsdf->isThin() && s.wi.z * side.wo.z < 0;
   bounce.onward = leaveSurface(scene, point, wi, w, media);
   // The bsdf's sample is that of radiance, which refraction scales and which knows the shading normal's cosine alone.
-  bounce.weight = s.weight * square(s.eta);
+  bounce.weight = s.weight, bounce.refraction = square(s.eta);
   if (!side.bsdf->specular())
-    bounce.weight *= std::fabs(side.wo.z * dot(w, point.geometricNormal) / (s.wi.z * arrival));
+    bounce.tilt = std::fabs(side.wo.z * dot(w, point.geometricNormal) / (s.wi.z * bounce.arrival));
   return bounce;
 }
 
@@ -141,10 +149,10 @@ class LightWalker {
     const SurfaceBounce bounce = bounceOff(scene_, state.at.ray, media, hit, state.depth, sampler);
     if (bounce.vertex.kind == VertexKind::surface) {
       LightVertex v = bounce.vertex;
-      v.weight *= state.flux;
+      v.weight = bounce.left(state.flux);
       if (!isBlack(v.weight)) visit(v, bounce.lambertian ? nullptr : &bounce.scattering);
     }
-    const Rgb next = state.flux * bounce.weight;
+    const Rgb next = bounce.carried(state.flux);
     if (isBlack(next)) return false;
     state.at = bounce.onward;
     if (bounce.passes) {
