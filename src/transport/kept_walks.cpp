@@ -342,7 +342,9 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
   frame_ = frame;
 
   const auto extinctions = std::make_shared<const std::vector<Rgb>>(meanExtinctions(scene));
-  const Defence defence = defenceOf(scene, *extinctions);
+  const auto isDue = [&](const KeptBlock& b) { return !b.drawnIn || outgrown(*extinctions, *b.drawnIn); };
+  const bool anyDue = std::any_of(blocks_.begin(), blocks_.end(), isDue);
+  const Defence defence = anyDue ? defenceOf(scene, *extinctions) : Defence();
   const KeptWalker walker(scene, defence.rates, options.maxDepth);
   const WalkStarts starts(scene);
   std::vector<VirtualLights> parts(count);
@@ -350,7 +352,7 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
     if (stop.stop_requested()) return;
     KeptBlock& block = blocks_[static_cast<size_t>(b)];
     const int first = static_cast<int>(b) * kBlock;
-    if (!block.drawnIn || outgrown(*extinctions, *block.drawnIn)) {
+    if (isDue(block)) {
       block = traceBlock(walker, starts, id, first, std::min(first + kBlock, options.walks));
       block.drawnIn = extinctions;
     }

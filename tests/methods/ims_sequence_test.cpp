@@ -76,7 +76,7 @@ void expectFramesAgree(const Case& c, int sets) {
 }
 
 const std::vector<Power> kPowers = {{Layer::surfaceToSurface, 0.03},
-                                    {Layer::mediaToSurface, 0.1},
+                                    {Layer::mediaToSurface, 0.06},
                                     {Layer::surfaceToMedia, 0.05},
                                     {Layer::mediaToMedia, 0.05}};
 
