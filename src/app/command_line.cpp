@@ -86,6 +86,12 @@ void addSceneOptions(CLI::App& app, SceneOptions& scene, const std::string& name
   app.add_flag("--lenient", scene.lenient, "Unknown elements and parameters of the scene are warnings, not errors");
 }
 
+FrameRange framesOf(const std::string& text) {
+  const auto range = frameRange(text);
+  if (!range) failValue("--frames", text, "expected FIRST..LAST, like 1..24, from 0 to 999999");
+  return *range;
+}
+
 void addStopRules(CLI::App& app, StopRules& stop) {
   constexpr int64_t kMostPasses = int64_t{1} << 40;
   const char* group = "When to stop (at the first that is met; default: the scene's sample_count)";
@@ -120,6 +126,11 @@ Action addRender(CLI::App& app) {
       app, "--size", [o](const std::string& t) { o->size = imageSize(t); },
       "Size of the film in place of the scene's; a crop window scales with it", "WxH");
   addParsed(
+      app, "--frames", [o](const std::string& t) { o->frames = framesOf(t); },
+      "A picture for each: $frame in the scene is 0001, 0002 ... and the time of its animations. Files are numbered: "
+      "out.exr is out.0001.exr, out_###.exr is out_001.exr",
+      "A..B");
+  addParsed(
       app, "--seed", [o](const std::string& t) { o->seed = wholeNumber<uint64_t>("--seed", t, 0, UINT64_MAX); },
       "Seed of all randomness", "N");
   addParsed(
@@ -132,7 +143,8 @@ Action addRender(CLI::App& app) {
   app.add_option("--stats", o->stats, "Write timings and counts as JSON")->type_name("FILE");
   app.add_flag("-q,--quiet", o->quiet, "Print nothing but errors");
   app.footer(
-      "Ctrl-C writes the picture as it is then (after the first pass, if need be); a second one quits at once.\n");
+      "Ctrl-C writes the picture as it is then (after the first pass, if need be); a second one quits at once.\n"
+      "Of a sequence it leaves the frames that are finished.\n");
   return [o] { return render(*o); };
 }
 

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "app/frames.h"
 #include "app/options.h"
 #include "app/ready_scene.h"
 #include "app/usage_error.h"
@@ -45,11 +46,6 @@ Plan planFor(const MakeOptions& options) {
   return plan;
 }
 
-fs::path numbered(const fs::path& file, int number) {
-  fs::path out = file;
-  return out.replace_extension(fmt::format(".{:04}{}", number, file.extension().string()));
-}
-
 // The volume of a scene is not named on the command line: one that was there before, without the scene, is somebody's.
 void requireOwnVolume(const MakeOptions& options, const Plan& plan, const fs::path& firstVolume) {
   if (plan.scene != fs::path(options.output) || !fs::exists(firstVolume) || fs::exists(plan.scene)) return;
@@ -86,7 +82,9 @@ int make(const MakeOptions& options) {
   const Plan plan = planFor(options);
   const Writer write = writerFor(plan.volume);
   const bool isSequence = options.frames > 0;
-  const auto fileOf = [&](int frame) { return isSequence ? numbered(plan.volume, frame + 1) : plan.volume; };
+  const auto fileOf = [&](int frame) {
+    return isSequence ? fs::path(numberedFile(plan.volume.string(), frame + 1)) : plan.volume;
+  };
   requireOwnVolume(options, plan, fileOf(0));
   checkWritable(fileOf(0));
   if (!plan.scene.empty()) checkWritable(plan.scene);

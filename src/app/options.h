@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "app/frames.h"
 #include "app/stopping.h"
 
 namespace virga::app {
@@ -27,6 +28,7 @@ struct RenderOptions {
   StopRules stop;
   std::optional<double> auditSeconds;  ///< to hold the finished picture against `path`
   std::optional<std::pair<int, int>> size;
+  std::optional<FrameRange> frames;  ///< a picture for each, with $frame set to its number
   uint64_t seed = 0;
   int threads = 0;                    ///< 0: as many as there are
   std::vector<std::string> settings;  ///< "method.param=value"

@@ -7,10 +7,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "app/audit_report.h"
 #include "app/dots.h"
+#include "app/frames.h"
 #include "app/interrupt.h"
 #include "app/method_settings.h"
 #include "app/options.h"
@@ -77,51 +79,129 @@ bool isBlack(const Image& image) {
   return std::all_of(image.pixels.begin(), image.pixels.end(), [](const Rgb& p) { return p == Rgb(0.f); });
 }
 
+// Errors of a sequence say in which frame they are.
+Error inFrame(const Error& error, const FrameRange& range, int frame) {
+  Error::Details details = error.details();
+  details.notes.push_back(fmt::format("in frame {} of --frames {}..{}", frameText(frame), range.first, range.last));
+  return Error(error.message(), std::move(details));
+}
+
+/// Renders one picture, or one after another: frames share the method's state and what does not change of the scene.
 class RenderJob {
  public:
   RenderJob(const RenderOptions& options, Interrupt& interrupt, int threads)
-      : options_(options), method_(findMethod(options.method)), interrupt_(interrupt) {
-    report_.sceneFile = options.scene.file;
-    report_.outputs = outputsOf(options);
-    report_.threads = threads;
-    report_.relMseLimit = options.stop.relMse;
-  }
+      : options_(options), method_(findMethod(options.method)), interrupt_(interrupt), threads_(threads) {}
 
-  void run() {
-    checkNames(allPictures(), options_.stats);
-    if (!options_.dots.empty() && outputFormat(options_.dots) != OutputFormat::png)
-      throw UsageError("--dots writes a PNG");
+  /// The exit code.
+  int run() {
+    begin(options_.frames ? std::optional(options_.frames->first) : std::nullopt);
+    checkCommand();
     requireInputsSafe({options_.scene.file});
     requireErrorEstimate(options_, method_);
-    const Settings settings = methodSettings(method_, options_.settings, options_.seed);
-    checkAllWritable(allPictures(), options_.stats);
-    const SceneSnapshot scene = loadAndBuild();
-    const LayerMask layers = options_.layers ? method_.layers : LayerMask::none();
-    requireMemory(*scene, layers);
-    const auto session = timed(report_.timings.prepare, [&] {
-      return std::make_unique<RenderSession>(scene, method_, RenderSession::Options{settings, layers});
-    });
-    renderPasses(*session);
-    audit(*session);
-    write(*session);
+    settings_ = methodSettings(method_, options_.settings, options_.seed);
+    checkAllWritable(allPictures(), report_.stats);  // of a sequence: all frames go to one folder
+    if (options_.frames) return renderSequence(*options_.frames);
+    renderPicture();
+    return 0;
   }
 
  private:
+  enum class Outcome { written, interrupted };
+
+  void checkCommand() const {
+    checkNames(allPictures(), report_.stats);
+    if (!options_.dots.empty() && outputFormat(options_.dots) != OutputFormat::png)
+      throw UsageError("--dots writes a PNG");
+    if (!options_.frames) return;
+    if (options_.scene.defines.contains("frame")) throw UsageError("--frames and -D frame= both say what $frame is");
+    if (isVolumeFile(options_.scene.file))
+      throw UsageError(
+          fmt::format("--frames: \"{}\" is a single volume; write a scene whose filename has $frame in "
+                      "it, as \"virga make\" does",
+                      options_.scene.file));
+  }
+
+  int renderSequence(const FrameRange& range) {
+    constexpr int kInterruptedWithoutPicture = 130;
+    for (int frame = range.first; frame <= range.last; ++frame) {
+      if (frameOf(range, frame) == Outcome::written) continue;
+      const bool none = frame == range.first;
+      say("interrupted: {}\n",
+          none ? "no frame is written" : fmt::format("frames {} to {} are written", range.first, frame - 1));
+      return none ? kInterruptedWithoutPicture : 0;
+    }
+    return 0;
+  }
+
+  Outcome frameOf(const FrameRange& range, int frame) {
+    if (interrupt_.requested()) return Outcome::interrupted;
+    begin(frame);
+    say("frame {} of {}..{}\n", frame, range.first, range.last);
+    try {
+      return renderPicture();
+    } catch (const Error& error) {
+      throw inFrame(error, range, frame);
+    }
+  }
+
+  // What is reported and where it goes.
+  void begin(std::optional<int> frame) {
+    const auto named = [&](const std::string& path) { return frame ? fileOfFrame(path, *frame) : path; };
+    report_ = {};
+    report_.sceneFile = options_.scene.file;
+    report_.frame = frame;
+    for (const std::string& output : outputsOf(options_)) report_.outputs.push_back(named(output));
+    report_.stats = named(options_.stats);
+    report_.dots = named(options_.dots);
+    report_.threads = threads_;
+    report_.relMseLimit = options_.stop.relMse;
+  }
+
+  Outcome renderPicture() {
+    const Stopwatch watch;
+    const double cpuBefore = session_ ? cpuSeconds() : 0;
+    const SceneSnapshot scene = loadAndBuild();
+    requireMemory(*scene, layers());
+    timed(report_.timings.prepare, [&] { return takeScene(scene); });
+    renderPasses(*session_);
+    const bool whole = report_.outcome.reason != StopReason::interrupted;
+    if (report_.frame && !whole) return Outcome::interrupted;
+    audit(*session_);
+    write(*session_, watch, cpuBefore);
+    return Outcome::written;
+  }
+
+  LayerMask layers() const { return options_.layers ? method_.layers : LayerMask::none(); }
+
+  // The first scene begins a session, the following ones edit it. Says which.
+  bool takeScene(const SceneSnapshot& scene) {
+    const bool first = !session_;
+    if (first)
+      session_ = std::make_unique<RenderSession>(scene, method_, RenderSession::Options{settings_, layers()});
+    else
+      session_->nextFrame(scene, differences(session_->scene().description, scene->description));
+    scene_ = scene;
+    return first;
+  }
+
   SceneSnapshot loadAndBuild() {
+    SceneOptions options = options_.scene;
+    if (report_.frame) options.defines["frame"] = frameText(*report_.frame);
     const SceneDescription description =
-        timed(report_.timings.load, [&] { return loadScene(options_.scene, report_.warnings); });
+        timed(report_.timings.load, [&] { return loadScene(options, report_.warnings); });
     requireInputsSafe(filesOf(description));
     SceneSnapshot scene = timed(report_.timings.build, [&] {
-      return buildScene(description, {.filmSize = options_.size, .lenient = options_.scene.lenient});
+      return buildScene(description, {.filmSize = options_.size, .lenient = options_.scene.lenient}, scene_);
     });
     report_.warnings.insert(report_.warnings.end(), scene->warnings.begin(), scene->warnings.end());
-    for (const std::string& warning : report_.warnings) say("{}\n", warning);
+    for (const std::string& warning : report_.warnings)
+      if (warned_.insert(warning).second) say("{}\n", warning);
     return scene;
   }
 
   void requireInputsSafe(const std::vector<std::filesystem::path>& inputs) const {
     for (const std::string& output : allPictures()) checkNotInput(output, inputs);
-    checkNotInput(options_.stats, inputs);
+    checkNotInput(report_.stats, inputs);
   }
 
   void renderPasses(RenderSession& session) {
@@ -134,7 +214,7 @@ class RenderJob {
     report_.timings.render = report_.outcome.state.seconds;
     report_.timings.renderCpu = cpuSeconds() - cpuBefore;
     progress.finish(report_.outcome.state);
-    if (report_.outcome.reason == StopReason::interrupted)
+    if (report_.outcome.reason == StopReason::interrupted && !report_.frame)
       say("interrupted: the picture holds {}{}\n", session.film().passes(), intendedText(rules));
   }
 
@@ -172,28 +252,28 @@ class RenderJob {
       warn("{}, says the audit", text);
   }
 
-  void write(const RenderSession& session) {
+  void write(const RenderSession& session, const Stopwatch& total, double cpuBefore) {
     warnOfNonFinite(session.film());
     warnOfBlack(session.film());
     const auto shield = interrupt_.shield();
     const Stopwatch watch;
     writePictures(report_.outputs, developed(session, report_, options_.layers ? WithLayers::yes : WithLayers::no));
-    if (!options_.dots.empty()) writeDots(session);
+    if (!report_.dots.empty()) writeDots(session);
     report_.timings.write = watch.seconds();
-    report_.timings.total = total_.seconds();
-    report_.timings.totalCpu = cpuSeconds();
-    if (!options_.stats.empty()) writeAtomically(options_.stats, statsJson(session, report_));
+    report_.timings.total = total.seconds();
+    report_.timings.totalCpu = cpuSeconds() - cpuBefore;
+    if (!report_.stats.empty()) writeAtomically(report_.stats, statsJson(session, report_));
     for (const std::string& path : allPictures()) say("wrote {}\n", path);
   }
 
   void writeDots(const RenderSession& session) {
     const Overlay overlay = session.method().overlay();
     if (overlay.dots.empty()) warn("--dots: method \"{}\" has nothing to draw", method_.name);
-    writePng(options_.dots, withDots(session.film().beauty(), session.scene(), overlay));
+    writePng(report_.dots, withDots(session.film().beauty(), session.scene(), overlay));
   }
   std::vector<std::string> allPictures() const {
     std::vector<std::string> all = report_.outputs;
-    if (!options_.dots.empty()) all.push_back(options_.dots);
+    if (!report_.dots.empty()) all.push_back(report_.dots);
     return all;
   }
 
@@ -225,21 +305,27 @@ class RenderJob {
   const RenderOptions& options_;
   const MethodInfo& method_;
   Interrupt& interrupt_;
-  Stopwatch total_;
+  int threads_;
+  Settings settings_;
+  SceneSnapshot scene_;  ///< the last one
+  std::unique_ptr<RenderSession> session_;
+  std::set<std::string> warned_;
   RenderReport report_;
 };
 
 }  // namespace
 
 int render(const RenderOptions& options) {
-  Interrupt interrupt([quiet = options.quiet] {
-    if (!quiet) fmt::print(stderr, "\nstopping: the picture is written; once more: quit at once, without it\n");
+  Interrupt interrupt([&options] {
+    if (options.quiet) return;
+    fmt::print(stderr, "\nstopping: {}\n",
+               options.frames ? "frames that are finished stay; once more: quit at once"
+                              : "the picture is written; once more: quit at once, without it");
   });
   const int threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
   tbb::task_arena arena(threads);
-  arena.execute([&] { RenderJob(options, interrupt, threads).run(); });
-  return 0;
+  return arena.execute([&] { return RenderJob(options, interrupt, threads).run(); });
 }
 
 }  // namespace virga::app

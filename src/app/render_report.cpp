@@ -23,6 +23,7 @@ Metadata metadata(const RenderSession& session, const RenderReport& report) {
   Metadata m;
   m["virga.version"] = VIRGA_VERSION;
   m["virga.scene"] = report.sceneFile;
+  if (report.frame) m["virga.frame"] = int64_t{*report.frame};
   m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
   m["virga.method"] = std::string(session.info().name);
   for (const auto& [name, value] : session.method().settingsInForce())
@@ -90,6 +91,7 @@ std::string statsJson(const RenderSession& session, const RenderReport& report) 
   const auto error = session.film().estimatedRelMse();
   const Json json = {{"version", VIRGA_VERSION},
                      {"scene", sceneJson(session, report.sceneFile)},
+                     {"frame", report.frame ? Json(*report.frame) : Json(nullptr)},
                      {"method", methodJson(session, report.outcome)},
                      {"threads", report.threads},
                      {"passes", session.film().passes()},

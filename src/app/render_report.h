@@ -25,7 +25,9 @@ struct Timings {
 /// Everything that `--stats` tells besides what is in the session.
 struct RenderReport {
   std::string sceneFile;
+  std::optional<int> frame;  ///< of a sequence
   std::vector<std::string> outputs;
+  std::string stats, dots;  ///< files; empty: none
   std::vector<std::string> warnings;
   LoopOutcome outcome;
   std::optional<AuditResult> audit;

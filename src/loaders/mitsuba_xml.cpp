@@ -21,7 +21,7 @@ const std::vector<std::string> kObjectTags{"integrator", "sensor",  "sampler", "
                                            "bsdf",       "emitter", "phase",   "medium", "volume",  "texture"};
 const std::vector<std::string> kValueTags{"float", "integer", "boolean", "string",
                                           "point", "vector",  "rgb",     "spectrum"};
-const std::vector<std::string> kOtherTags{"transform", "ref", "default", "include", "path", "alias"};
+const std::vector<std::string> kOtherTags{"transform", "animation", "ref", "default", "include", "path", "alias"};
 
 constexpr size_t kMaxIncludes = 1000;
 
@@ -128,7 +128,8 @@ class Loader {
     if (element.name == "include") return readInclude(parent, element, context, depth);
     if (element.name == "scene") throw errorAt(element.position, "a <scene> cannot stand inside another element");
     if (!contains(knownTags(), element.name)) return refuseElement(element);
-    if (element.name == "transform") return readTransform(parent, element);
+    if (element.name == "transform") return readPose(parent, element, parseTransform);
+    if (element.name == "animation") return readPose(parent, element, parseAnimation);
     requireNoChildren(element);
     if (contains(kValueTags, element.name)) return readValue(parent, element);
     if (element.name == "ref") return readReference(parent, element);
@@ -159,9 +160,11 @@ class Loader {
     parent.links.push_back({.property = parent.node.properties.size() - 1, .id = id.text, .notes = id.notes});
   }
 
-  void readTransform(NodeDraft& parent, const xml::Element& element) {
+  // An animation is the pose that it has at the frame to be rendered: a description is that of one frame.
+  void readPose(NodeDraft& parent, const xml::Element& element,
+                Matrix4 (*parse)(const xml::Element&, Variables&, const Complaints&)) {
     const Attributes attributes = read(element, {"name"});
-    const Matrix4 matrix = parseTransform(element, variables_, complaints_);
+    const Matrix4 matrix = parse(element, variables_, complaints_);
     addProperty(parent, element, &attributes.required("name")).value = matrix;
   }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/keyframes.h"
 #include "loaders/error_at.h"
 #include "loaders/xml_values.h"
 
@@ -125,6 +126,28 @@ Matrix4 parseTransform(const xml::Element& transform, Variables& variables, cons
     if (const std::optional<Matrix4> step = reader.step(element)) product = *step * product;
   if (!product.isFinite()) throw errorAt(transform.position, "this transform overflows");
   return product;
+}
+
+Matrix4 parseAnimation(const xml::Element& animation, Variables& variables, const Complaints& complaints) {
+  std::vector<Keyframe> keyframes;
+  for (const xml::Element& element : animation.children) {
+    if (element.name != "transform") {
+      complaints.unknown(errorAt(element.position, fmt::format("{} cannot stand in an <animation>", tagOf(element)), "",
+                                 {"available: transform"}));
+      continue;
+    }
+    const Attributes attributes(element, {"time"}, variables, complaints);
+    const Argument& time = attributes.required("time");
+    const Keyframe key{parseNumber(time), parseTransform(element, variables, complaints)};
+    if (!keyframes.empty() && key.time <= keyframes.back().time) time.fail("the times of keyframes must increase");
+    if (key.pose.isSingular())
+      throw errorAt(element.position, "this keyframe flattens space", "an animation needs regular transforms");
+    keyframes.push_back(key);
+  }
+  if (keyframes.empty())
+    throw errorAt(animation.position, "an <animation> needs keyframes", "<transform time=\"1\"> ... </transform>");
+  const double time = variables.frame(animation.position).value_or(keyframes.front().time);
+  return poseAt(keyframes, time);
 }
 
 }  // namespace virga

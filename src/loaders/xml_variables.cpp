@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 
 #include "loaders/error_at.h"
 
@@ -83,6 +85,20 @@ Argument Variables::substituted(const xml::Attribute& attribute) {
     i += 1 + name.size();
   }
   return out;
+}
+
+std::optional<double> Variables::frame(const SourcePosition& user) {
+  const auto found = variables_.find("frame");
+  if (found == variables_.end()) return std::nullopt;
+  Variable& variable = found->second;
+  variable.used = true;
+  const std::string& text = variable.value;
+  double number = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(number))
+    throw errorAt(user, fmt::format("$frame, the time of animations, is \"{}\": no number", text), "",
+                  {fmt::format("$frame is {}", variable.origin)});
+  return number;
 }
 
 std::vector<std::string> Variables::namesInScene() const {

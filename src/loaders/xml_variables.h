@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ class Variables {
 
   /// The attribute's value with each `$name` replaced, by the longest name that fits. Throws Error at an unknown one.
   Argument substituted(const xml::Attribute& attribute);
+
+  /// The number that the variable `frame` has, which is what animations are asked for; nothing where it is not defined.
+  /// Throws Error, placed at `user`, where it is no number.
+  std::optional<double> frame(const SourcePosition& user);
 
   /// Throws Error for a value from the command line that no attribute used: it would change nothing.
   void requireAllUsed() const;

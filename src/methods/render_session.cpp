@@ -25,7 +25,15 @@ void RenderSession::edit(SceneSnapshot next, const ChangeSet& changes) {
   const Reset reset = method_->update(scene_, changes);
   const bool resized = film_->width() != scene_->camera.width || film_->height() != scene_->camera.height;
   if (resized) film_ = std::make_unique<Film>(scene_->camera.width, scene_->camera.height, options_.layers);
-  if (reset == Reset::nothingLost && !resized) return;
+  if (reset != Reset::nothingLost || resized) restart();
+}
+
+void RenderSession::nextFrame(SceneSnapshot next, const ChangeSet& changes) {
+  edit(std::move(next), changes);
+  restart();
+}
+
+void RenderSession::restart() {
   film_->clear();
   nextPass_ = 0;
 }

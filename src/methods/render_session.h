@@ -22,6 +22,8 @@ class RenderSession {
   PassResult step(const Budget& = {}, std::stop_token = {});
   /// The scene changes; the film and the method forget what no longer holds.
   void edit(SceneSnapshot next, const ChangeSet&);
+  /// The next frame of a sequence: as an edit, and the film starts anew even where nothing changed.
+  void nextFrame(SceneSnapshot next, const ChangeSet&);
 
   const Film& film() const { return *film_; }
   const Scene& scene() const { return *scene_; }
@@ -31,6 +33,8 @@ class RenderSession {
   int64_t passes() const { return nextPass_; }
 
  private:
+  void restart();
+
   SceneSnapshot scene_;
   const MethodInfo* info_;
   Options options_;

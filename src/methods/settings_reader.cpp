@@ -8,6 +8,16 @@
 #include <cmath>
 
 namespace virga {
+namespace {
+
+std::optional<float> finite(std::string_view text) {
+  float value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool valid = error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+  return valid ? std::optional(value) : std::nullopt;
+}
+
+}  // namespace
 
 SettingsReader::SettingsReader(const Settings& settings, std::span<const SettingInfo> known, std::string_view method)
     : settings_(settings), method_(method) {
@@ -32,10 +42,16 @@ std::optional<int> SettingsReader::integer(std::string_view name, int lowest) co
 std::optional<float> SettingsReader::number(std::string_view name, float above) const {
   const std::string* text = find(name);
   if (!text) return {};
-  float value = 0;
-  const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
-  if (error != std::errc() || end != text->data() + text->size() || !std::isfinite(value) || !(value > above))
-    fail(name, fmt::format("a number above {}", above));
+  const std::optional<float> value = finite(*text);
+  if (!value || !(*value > above)) fail(name, fmt::format("a number above {}", above));
+  return value;
+}
+
+std::optional<float> SettingsReader::share(std::string_view name) const {
+  const std::string* text = find(name);
+  if (!text) return {};
+  const std::optional<float> value = finite(*text);
+  if (!value || !(*value >= 0) || !(*value <= 1)) fail(name, "a number from 0 to 1");
   return value;
 }
 

@@ -19,6 +19,8 @@ class SettingsReader {
   std::optional<int> integer(std::string_view name, int lowest) const;
   /// Finite and above `above`.
   std::optional<float> number(std::string_view name, float above) const;
+  /// From 0 to 1, both included.
+  std::optional<float> share(std::string_view name) const;
   /// Index of the word among `words`.
   std::optional<int> choice(std::string_view name, std::span<const std::string_view> words) const;
   std::optional<bool> boolean(std::string_view name) const;

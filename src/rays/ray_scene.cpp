@@ -4,8 +4,12 @@
 #include <embree3/rtcore.h>
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <variant>
+
 #include "core/error.h"
-#include "rays/analytic_shapes.h"
+#include "rays/analytic.h"
 
 namespace virga {
 namespace {
@@ -33,7 +37,7 @@ void requireNoError() {
 
 struct RayShape::Impl {
   RTCGeometry geometry = nullptr;
-  std::variant<std::monostate, Sphere, Disk, Cylinder, Box> analytic;
+  analytic::Shape analytic;
   Bounds bounds;  ///< of an analytic shape
 
   ~Impl() { rtcReleaseGeometry(geometry); }
@@ -41,15 +45,30 @@ struct RayShape::Impl {
 
 namespace {
 
+/// The numbers of a scene's shapes, by where they are sorted: the standing ones, and each that moved.
+struct ShapeNumbers {
+  std::vector<uint32_t> standing, moved;
+
+  /// Those that stand are instance 0 of the top or, without a top, of none.
+  uint32_t of(uint32_t instance, uint32_t geometry) const {
+    const bool stands = instance == RTC_INVALID_GEOMETRY_ID || instance == 0;
+    return stands ? standing[geometry] : moved[instance - 1];
+  }
+};
+
 /// Extends Embree's context: where `list` is set, every hit goes there and none ends the ray.
 struct Context {
   RTCIntersectContext embree;
+  const ShapeNumbers* numbers = nullptr;
   CrossingList* list = nullptr;
+
+  /// The number of the shape that is being asked.
+  uint32_t shape(uint32_t geometry) const { return numbers->of(embree.instID[0], geometry); }
 };
 
-LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
+analytic::LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
   return std::visit(
-      [&](const auto& s) -> LineHits {
+      [&](const auto& s) -> analytic::LineHits {
         if constexpr (std::is_same_v<std::decay_t<decltype(s)>, std::monostate>)
           return {};
         else
@@ -60,7 +79,7 @@ LineHits intersectAnalytic(const RayShape::Impl& shape, Vec3 o, Vec3 d) {
 
 void gatherAnalytic(const RayShape::Impl& shape, uint32_t index, const Ray& ray, float tMin, float tMax,
                     CrossingList& list) {
-  const LineHits hits = intersectAnalytic(shape, ray.o, ray.d);
+  const analytic::LineHits hits = intersectAnalytic(shape, ray.o, ray.d);
   for (int i = 0; i < hits.count; ++i)
     if (hits.hit[i].t >= tMin && hits.hit[i].t <= tMax) list.insert({hits.hit[i].t, index, hits.hit[i].entering});
 }
@@ -76,8 +95,8 @@ void boundsCallback(const RTCBoundsFunctionArguments* args) {
 }
 
 // Nearest of the shape's hits in the ray's open interval.
-LineHit nearestOf(const LineHits& hits, float tMin, float tMax) {
-  LineHit best{kInfinity, false};
+analytic::LineHit nearestOf(const analytic::LineHits& hits, float tMin, float tMax) {
+  analytic::LineHit best{kInfinity, false};
   for (int i = 0; i < hits.count; ++i)
     if (hits.hit[i].t > tMin && hits.hit[i].t < tMax && hits.hit[i].t < best.t) best = hits.hit[i];
   return best;
@@ -87,18 +106,19 @@ void intersectCallback(const RTCIntersectFunctionNArguments* args) {
   auto* rayHit = reinterpret_cast<RTCRayHit*>(args->rayhit);
   RTCRay& r = rayHit->ray;
   const Vec3 o(r.org_x, r.org_y, r.org_z), d(r.dir_x, r.dir_y, r.dir_z);
-  const LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), o, d);
+  const analytic::LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), o, d);
   auto* context = reinterpret_cast<Context*>(args->context);
   if (context->list) {
     for (int i = 0; i < hits.count; ++i)
       if (hits.hit[i].t >= r.tnear && hits.hit[i].t <= r.tfar)
-        context->list->insert({hits.hit[i].t, args->geomID, hits.hit[i].entering});
+        context->list->insert({hits.hit[i].t, context->shape(args->geomID), hits.hit[i].entering});
     return;
   }
-  const LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
+  const analytic::LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
   if (nearest.t == kInfinity) return;
   r.tfar = nearest.t;
   rayHit->hit.geomID = args->geomID;
+  rayHit->hit.instID[0] = args->context->instID[0];
   rayHit->hit.primID = args->primID;
   rayHit->hit.u = rayHit->hit.v = 0;
 }
@@ -123,7 +143,7 @@ void recordCrossing(const RTCFilterFunctionNArguments* args) {
   const auto* r = reinterpret_cast<const RTCRay*>(args->ray);
   const auto* h = reinterpret_cast<const RTCHit*>(args->hit);
   const bool entering = h->Ng_x * r->dir_x + h->Ng_y * r->dir_y + h->Ng_z * r->dir_z < 0;
-  context->list->insert({r->tfar, h->geomID, entering, onEdge(*r, *h)});
+  context->list->insert({r->tfar, context->shape(h->geomID), entering, onEdge(*r, *h)});
   args->valid[0] = 0;
 }
 
@@ -151,13 +171,13 @@ float distanceOf(const RayShape::Impl& shape, unsigned primitive, const Clearanc
                c = positions[t[3 * primitive + 2]];
     const float size = maxComponent(max(abs(a), max(abs(b), abs(c))));
     const bool counts = query.counts(size, [&](Vec3 n) { return std::max(dot(n, a), std::max(dot(n, b), dot(n, c))); });
-    return counts ? distanceToTriangle(query.p, a, b, c) : kInfinity;
+    return counts ? analytic::distanceToTriangle(query.p, a, b, c) : kInfinity;
   }
   return std::visit(
       [&](const auto& s) -> float {
         using Shape = std::decay_t<decltype(s)>;
-        if constexpr (std::is_same_v<Shape, std::monostate> || std::is_same_v<Shape, Box>) {
-          return lowerDistance(shape.bounds, query.p);
+        if constexpr (std::is_same_v<Shape, std::monostate> || std::is_same_v<Shape, analytic::Box>) {
+          return analytic::lowerDistance(shape.bounds, query.p);
         } else {
           const float size = maxComponent(max(abs(shape.bounds.lo), abs(shape.bounds.hi)));
           const bool counts = query.counts(size, [&](Vec3 n) { return farthestAlong(s, n); });
@@ -176,9 +196,9 @@ bool clearanceCallback(RTCPointQueryFunctionArguments* args) {
   return true;
 }
 
-std::shared_ptr<const RayShape> analyticShape(const Analytic& shape, const Bounds& bounds) {
+std::shared_ptr<const RayShape> analyticShape(const analytic::Shape& shape, const Bounds& bounds) {
   auto impl = std::make_unique<RayShape::Impl>();
-  std::visit([&](const auto& s) { impl->analytic = s; }, shape);
+  impl->analytic = shape;
   impl->bounds = bounds;
   impl->geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(impl->geometry, 1);
@@ -208,17 +228,17 @@ std::shared_ptr<const RayShape> RayShape::triangles(std::span<const Vec3> positi
 }
 
 std::shared_ptr<const RayShape> RayShape::sphere(Vec3 center, float radius) {
-  const Sphere s{center, radius};
+  const analytic::Sphere s{center, radius};
   return analyticShape(s, boundsOf(s));
 }
 
 std::shared_ptr<const RayShape> RayShape::disk(Vec3 center, Vec3 unitNormal, float radius) {
-  const Disk k{center, unitNormal, radius};
+  const analytic::Disk k{center, unitNormal, radius};
   return analyticShape(k, boundsOf(k));
 }
 
 std::shared_ptr<const RayShape> RayShape::cylinder(Vec3 end, Vec3 unitAxis, float radius, float length) {
-  const Cylinder c{end, unitAxis, radius, length};
+  const analytic::Cylinder c{end, unitAxis, radius, length};
   return analyticShape(c, boundsOf(c));
 }
 
@@ -226,31 +246,123 @@ std::shared_ptr<const RayShape> RayShape::box(const Matrix4& toWorld) {
   const Affine map(toWorld);
   Bounds bounds;
   for (int i = 0; i < 8; ++i) bounds.extend(map.point(Bounds{Vec3(-1), Vec3(1)}.corner(i)));
-  return analyticShape(Box{Affine(toWorld.inverse())}, bounds);
+  return analyticShape(analytic::Box{Affine(toWorld.inverse())}, bounds);
 }
 
+namespace {
+
+RTCScene newScene() {
+  const RTCScene scene = rtcNewScene(device());
+  rtcSetSceneFlags(scene, static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
+  return scene;
+}
+
+/// Shapes that are sorted together. Immutable, shared between scenes.
+struct Group {
+  RayScene::Shapes shapes;
+  RTCScene scene = newScene();
+
+  explicit Group(RayScene::Shapes of) : shapes(std::move(of)) {
+    for (size_t i = 0; i < shapes.size(); ++i)
+      rtcAttachGeometryByID(scene, shapes[i]->impl().geometry, static_cast<unsigned>(i));
+    rtcCommitScene(scene);
+  }
+  Group(const Group&) = delete;
+  Group& operator=(const Group&) = delete;
+  ~Group() { rtcReleaseScene(scene); }
+};
+using GroupPtr = std::shared_ptr<const Group>;
+
+constexpr uint32_t kGone = ~0u;
+
+// For each member of a group the number that it has among `shapes`, kGone if it is not there; marks those found. One
+// shape may be there several times.
+std::vector<uint32_t> findMembers(const Group& group, const RayScene::Shapes& shapes, std::vector<bool>& found) {
+  std::multimap<const RayShape*, uint32_t> numbers;
+  for (size_t i = shapes.size(); i-- > 0;) numbers.emplace(shapes[i].get(), static_cast<uint32_t>(i));
+  std::vector<uint32_t> result;
+  for (const auto& member : group.shapes) {
+    const auto number = numbers.find(member.get());
+    result.push_back(number == numbers.end() ? kGone : number->second);
+    if (number == numbers.end()) continue;
+    found[number->second] = true;
+    numbers.erase(number);
+  }
+  return result;
+}
+
+}  // namespace
+
 struct RayScene::Impl {
-  RTCScene scene = rtcNewScene(device());
+  GroupPtr standing;
+  std::vector<GroupPtr> moved;  ///< one shape each
+  ShapeNumbers numbers;
+  RTCScene top = nullptr;  ///< over all groups, if any shape moved
   /// Few analytic boundaries are quicker asked one by one than through a traversal.
   bool askOneByOne = false;
 
-  ~Impl() { rtcReleaseScene(scene); }
+  ~Impl() { rtcReleaseScene(top); }
+
+  RTCScene scene() const { return top ? top : standing->scene; }
+
+  void standAll(const Shapes& shapes) {
+    numbers.standing.clear();
+    standing = std::make_shared<const Group>(shapes);
+    for (size_t i = 0; i < shapes.size(); ++i) numbers.standing.push_back(static_cast<uint32_t>(i));
+  }
+
+  void takeFrom(const Impl& previous, const Shapes& shapes) {
+    std::vector<bool> stands(shapes.size());
+    numbers.standing = findMembers(*previous.standing, shapes, stands);
+    if (std::find(stands.begin(), stands.end(), true) == stands.end()) return standAll(shapes);
+    standing = previous.standing;
+    if (std::erase(numbers.standing, kGone) > 0) {
+      Shapes still;
+      for (const uint32_t number : numbers.standing) still.push_back(shapes[number]);
+      standing = std::make_shared<const Group>(std::move(still));
+    }
+    for (size_t i = 0; i < shapes.size(); ++i) {
+      if (stands[i]) continue;
+      numbers.moved.push_back(static_cast<uint32_t>(i));
+      const auto known = std::find_if(previous.moved.begin(), previous.moved.end(),
+                                      [&](const GroupPtr& g) { return g->shapes.front() == shapes[i]; });
+      moved.push_back(known == previous.moved.end() ? std::make_shared<const Group>(Shapes{shapes[i]}) : *known);
+    }
+    if (!moved.empty()) raiseTop();
+  }
+
+  void raiseTop() {
+    top = newScene();
+    addInstance(*standing, 0);
+    for (size_t i = 0; i < moved.size(); ++i) addInstance(*moved[i], 1 + static_cast<uint32_t>(i));
+    rtcCommitScene(top);
+  }
+
+  void addInstance(const Group& group, uint32_t id) const {
+    const RTCGeometry instance = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(instance, group.scene);
+    rtcCommitGeometry(instance);
+    rtcAttachGeometryByID(top, instance, id);
+    rtcReleaseGeometry(instance);
+  }
 };
 
-RayScene::RayScene(std::vector<std::shared_ptr<const RayShape>> shapes)
+RayScene::RayScene(Shapes shapes, const RayScene* previous)
     : shapes_(std::move(shapes)), impl_(std::make_unique<Impl>()) {
   constexpr size_t kFew = 4;
-  rtcSetSceneFlags(impl_->scene,
-                   static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   impl_->askOneByOne = shapes_.size() <= kFew;
-  for (size_t i = 0; i < shapes_.size(); ++i) {
-    const RayShape::Impl& shape = shapes_[i]->impl();
-    if (std::holds_alternative<std::monostate>(shape.analytic)) impl_->askOneByOne = false;
-    rtcAttachGeometryByID(impl_->scene, shape.geometry, static_cast<unsigned>(i));
-  }
-  rtcCommitScene(impl_->scene);
+  for (const auto& shape : shapes_)
+    if (std::holds_alternative<std::monostate>(shape->impl().analytic)) impl_->askOneByOne = false;
+  if (previous)
+    impl_->takeFrom(*previous->impl_, shapes_);
+  else
+    impl_->standAll(shapes_);
   requireNoError();
 }
+
+int RayScene::movedShapes() const { return static_cast<int>(impl_->moved.size()); }
+
+bool RayScene::sharesStandingShapes(const RayScene& other) const { return impl_->standing == other.impl_->standing; }
 
 RayScene::~RayScene() = default;
 
@@ -262,9 +374,9 @@ RayHit RayScene::nearest(const Ray& ray, float tMin, float tMax) const {
   q.ray = {ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &context.embree, &q);
+  rtcIntersect1(impl_->scene(), &context.embree, &q);
   if (q.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
-  return {q.ray.tfar, q.hit.geomID, q.hit.primID, q.hit.u, q.hit.v};
+  return {q.ray.tfar, impl_->numbers.of(q.hit.instID[0], q.hit.geomID), q.hit.primID, q.hit.u, q.hit.v};
 }
 
 bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
@@ -272,17 +384,21 @@ bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
   Context context;
   rtcInitIntersectContext(&context.embree);
   RTCRay q{ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
-  rtcOccluded1(impl_->scene, &context.embree, &q);
+  rtcOccluded1(impl_->scene(), &context.embree, &q);
   return q.tfar < 0;
 }
 
 float RayScene::clearance(Vec3 p, std::span<const Vec3> sides) const {
   if (shapes_.empty()) return kInfinity;
-  ClearanceQuery query{shapes_, p, sides};
-  RTCPointQueryContext context;
-  rtcInitPointQueryContext(&context);
   RTCPointQuery q{p.x, p.y, p.z, 0, kInfinity};
-  rtcPointQuery(impl_->scene, &q, &context, clearanceCallback, &query);
+  const auto search = [&](const Group& group) {
+    ClearanceQuery query{group.shapes, p, sides};
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(group.scene, &q, &context, clearanceCallback, &query);
+  };
+  search(*impl_->standing);
+  for (const GroupPtr& group : impl_->moved) search(*group);
   return q.radius;
 }
 
@@ -297,11 +413,12 @@ void RayScene::crossings(const Ray& ray, float tMin, float tMax, CrossingList& l
   rtcInitIntersectContext(&context.embree);
   context.embree.filter = recordCrossing;
   context.list = &list;
+  context.numbers = &impl_->numbers;
   RTCRayHit q{};
   q.ray = {ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   q.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   q.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(impl_->scene, &context.embree, &q);
+  rtcIntersect1(impl_->scene(), &context.embree, &q);
 }
 
 }  // namespace virga

@@ -35,13 +35,23 @@ class RayShape {
   std::unique_ptr<Impl> impl_;
 };
 
-/// A set of shapes with an acceleration structure (Embree).
+/// A set of shapes with an acceleration structure (Embree). Of two levels where shapes have moved: those that stand
+/// are sorted together, each that moved for itself, and all of these under one top (docs/decisions/moving-shapes.md).
 class RayScene {
  public:
-  explicit RayScene(std::vector<std::shared_ptr<const RayShape>> shapes);
+  using Shapes = std::vector<std::shared_ptr<const RayShape>>;
+
+  /// What is sorted in `previous` already is taken from there: the shapes that have been standing, if all of them are
+  /// here still, and those that have moved before. Queries find the same as in a scene without a previous one.
+  explicit RayScene(Shapes shapes, const RayScene* previous = nullptr);
   ~RayScene();
 
   bool empty() const { return shapes_.empty(); }
+  const Shapes& shapes() const { return shapes_; }
+  /// How many shapes are sorted by themselves.
+  int movedShapes() const;
+  /// Do both have their standing shapes in one and the same structure?
+  bool sharesStandingShapes(const RayScene& other) const;
   /// Nearest hit with tMin < t < tMax.
   RayHit nearest(const Ray& ray, float tMin, float tMax) const;
   /// Anything with tMin < t < tMax?
@@ -56,7 +66,7 @@ class RayScene {
 
  private:
   struct Impl;
-  std::vector<std::shared_ptr<const RayShape>> shapes_;
+  Shapes shapes_;
   std::unique_ptr<Impl> impl_;
 };
 

@@ -16,14 +16,18 @@ View<T> viewOf(const std::vector<T>& v) {
   return {v.data(), static_cast<int>(v.size())};
 }
 
-void linkShapes(Scene& scene, Scene::Parts& parts) {
-  const auto rays = [](const std::vector<std::shared_ptr<const BuiltShape>>& shapes) {
-    std::vector<std::shared_ptr<const RayShape>> result;
-    for (const auto& s : shapes) result.push_back(s->rays);
-    return std::make_shared<const RayScene>(std::move(result));
-  };
-  scene.surfaceRays = rays(parts.surfaceShapes);
-  scene.boundaryRays = rays(parts.boundaryShapes);
+using RayScenePtr = std::shared_ptr<const RayScene>;
+
+RayScenePtr raysOf(const std::vector<std::shared_ptr<const BuiltShape>>& shapes, const RayScenePtr& previous) {
+  RayScene::Shapes rays;
+  for (const auto& s : shapes) rays.push_back(s->rays);
+  if (previous && previous->shapes() == rays) return previous;
+  return std::make_shared<const RayScene>(std::move(rays), previous.get());
+}
+
+void linkShapes(Scene& scene, Scene::Parts& parts, const SceneSnapshot& previous) {
+  scene.surfaceRays = raysOf(parts.surfaceShapes, previous ? previous->surfaceRays : nullptr);
+  scene.boundaryRays = raysOf(parts.boundaryShapes, previous ? previous->boundaryRays : nullptr);
 }
 
 void linkViews(Scene& scene, const Scene::Parts& parts) {
@@ -173,7 +177,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   buildSensor(context, *sensor);
   reader.finish();
 
-  linkShapes(*scene, *parts);
+  linkShapes(*scene, *parts, previous);
   measureBounds(*scene, *parts);
   checkLimits(context);
   warnOfOverlaps(context);

@@ -20,11 +20,74 @@ struct alignas(64) LightVertex {
   Vec3 normal;       ///< geometric, on the side of the bsdf's frame; 0 in media
 };
 
+/// Random numbers of a walk's step: of a low-discrepancy sequence at first.
+struct WalkNumbers {
+  static constexpr int kStratifiedBounces = 4;
+
+  VIRGA_HD static Vec2 pair(int depth, Sampler& sampler) {
+    return depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
+  }
+  VIRGA_HD static float one(int depth, Sampler& sampler) {
+    return depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
+  }
+};
+
+/// What a surface makes of the flux that arrives on it.
+struct SurfaceBounce {
+  LightVertex vertex;            ///< without a kind where no light is left: on narrow bsdfs (Bsdf::broad)
+  SurfaceScattering scattering;  ///< of the vertex
+  bool lambertian = false;       ///< then the vertex does without
+  float arrival = 1;             ///< |cosine| of the light to the geometry
+  MediaRay onward;
+  Rgb weight;                      ///< of the bsdf's sample; black: the walk ends here
+  float refraction = 1, tilt = 1;  ///< what makes it that of flux, and of the geometry's cosines
+  bool passes = false;             ///< straight through thin glass, which does not count as scattering
+
+  /// The weight of the vertex.
+  VIRGA_HD Rgb left(Rgb flux) const {
+    return lambertian ? flux / arrival * scattering.scattering(vertex.normal, vertex.wi) : flux / arrival;
+  }
+  /// The flux that goes on.
+  VIRGA_HD Rgb carried(Rgb flux) const { return flux * weight * refraction * tilt; }
+};
+
+/// Surfaces scatter light by the adjoint of their bsdf: no scaling of refracted radiance, corrected for shading normals
+/// (Veach 1997, 5.3). `media` are around the point where `at` arrives; `depth` counts the scattering events before.
+VIRGA_HD inline SurfaceBounce bounceOff(const SceneView& scene, const Ray& at, const MediaState& media,
+                                        const RayHit& hit, int depth, Sampler& sampler) {
+  SurfaceBounce bounce;
+  const SurfacePoint point = surfacePoint(scene.surfaces[hit.shape], at, hit, scene.scale);
+  const Vec3 wi = -at.d;
+  Bsdf textured;
+  const Side side = sideOf(scene, point, hit, wi, textured);
+  const bool fromBehind = side.wo.z <= 0 && !side.bsdf->transmits();  // black, as one-sided bsdfs are there
+  if (fromBehind || side.leaks(wi, side.wo)) return bounce;
+  bounce.arrival = std::fabs(dot(wi, point.geometricNormal));
+  if (side.bsdf->broad()) {
+    bounce.scattering = SurfaceScattering(side);
+    LightVertex& v = bounce.vertex;
+    v.kind = VertexKind::surface, v.p = point.p, v.wi = wi;
+    v.depth = depth + 1, v.normal = side.normal;
+    bounce.lambertian = side.bsdf->kind() == Bsdf::Kind::diffuse && point.shadingNormal == point.geometricNormal;
+  }
+  const float choice = WalkNumbers::one(depth, sampler);
+  const BsdfSample s = side.bsdf->sample(side.wo, WalkNumbers::pair(depth, sampler), choice);
+  if (!(s.pdf > 0) || isBlack(s.weight)) return bounce;
+  const Vec3 w = side.frame.toWorld(s.wi);
+  if (side.leaks(w, s.wi)) return bounce;
+  bounce.passes = side.bsdf->isThin() && s.wi.z * side.wo.z < 0;
+  bounce.onward = leaveSurface(scene, point, wi, w, media);
+  // The bsdf's sample is that of radiance, which refraction scales and which knows the shading normal's cosine alone.
+  bounce.weight = s.weight, bounce.refraction = square(s.eta);
+  if (!side.bsdf->specular())
+    bounce.tilt = std::fabs(side.wo.z * dot(w, point.geometricNormal) / (s.wi.z * bounce.arrival));
+  return bounce;
+}
+
 /// Random walks that carry flux from the lights (methods.md 2.1; Dachsbacher et al.'s virtual point lights in media,
 /// equations of section 3 of the instant-scattering paper). Shared by all methods that trace light.
 ///
-/// A vertex in a medium is found by an exact free flight: its weight is the flux times the albedo. Surfaces scatter by
-/// the adjoint of their bsdf: no scaling of refracted radiance, corrected for shading normals (Veach 1997, 5.3).
+/// A vertex in a medium is found by an exact free flight: its weight is the flux times the albedo.
 template <class Rays>
 class LightWalker {
  public:
@@ -48,21 +111,13 @@ class LightWalker {
     int depth = 0;
   };
 
-  static constexpr int kStratifiedBounces = 4;
-  VIRGA_HD static Vec2 pair(const State& s, Sampler& sampler) {
-    return s.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
-  }
-  VIRGA_HD static float one(const State& s, Sampler& sampler) {
-    return s.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
-  }
-
   template <class Visit>
   VIRGA_HD bool step(State& state, Sampler& sampler, Visit& visit) const {
     if (maxDepth_ >= 0 && state.depth >= maxDepth_) return false;
     const RayHit hit = rays_.nearest(state.at.ray, kInfinity);
     MediaRay flown = state.at;
     Collision collision;
-    SpectralFlight spectral(state.flux, scene_.chromatic ? one(state, sampler) : 0.f);
+    SpectralFlight spectral(state.flux, scene_.chromatic ? WalkNumbers::one(state.depth, sampler) : 0.f);
     walkMedia(scene_, rays_, flown, hit.t, [&](float t0, float t1) {
       if (flown.media.vacuum()) return true;
       collision = scene_.chromatic ? collide(flown, t0, t1, sampler.stream(), spectral)
@@ -91,7 +146,7 @@ class LightWalker {
     v.kind = VertexKind::medium, v.p = p, v.wi = wi, v.weight = scattered, v.medium = collision.medium;
     v.depth = ++state.depth;
     visit(v, nullptr);
-    const PhaseSample s = medium.phaseAt(p).sample(wi, pair(state, sampler));
+    const PhaseSample s = medium.phaseAt(p).sample(wi, WalkNumbers::pair(state.depth, sampler));
     state.at = {{p, s.wi}, media, 0};
     return survives(state, scattered * (s.value / s.pdf), sampler);
   }
@@ -99,33 +154,16 @@ class LightWalker {
   template <class Visit>
   VIRGA_HD bool scatterOnSurface(State& state, const MediaState& media, const RayHit& hit, Sampler& sampler,
                                  Visit& visit) const {
-    const SurfacePoint point = surfacePoint(scene_.surfaces[hit.shape], state.at.ray, hit, scene_.scale);
-    const Vec3 wi = -state.at.ray.d;
-    Bsdf textured;
-    const Side side = sideOf(scene_, point, hit, wi, textured);
-    const bool specular = side.bsdf->specular();
-    const bool fromBehind = side.wo.z <= 0 && !side.bsdf->transmits();  // black, as one-sided bsdfs are there
-    if (fromBehind || side.leaks(wi, side.wo)) return false;
-    const float arrival = std::fabs(dot(wi, point.geometricNormal));
-    if (side.bsdf->broad()) {
-      const SurfaceScattering scattering(side);
-      LightVertex v;
-      v.kind = VertexKind::surface, v.p = point.p, v.wi = wi, v.weight = state.flux / arrival;
-      v.depth = state.depth + 1, v.normal = side.normal;
-      const bool lambertian = side.bsdf->kind() == Bsdf::Kind::diffuse && point.shadingNormal == point.geometricNormal;
-      if (lambertian) v.weight *= scattering.scattering(side.normal, wi);
-      if (!isBlack(v.weight)) visit(v, lambertian ? nullptr : &scattering);
+    const SurfaceBounce bounce = bounceOff(scene_, state.at.ray, media, hit, state.depth, sampler);
+    if (bounce.vertex.kind == VertexKind::surface) {
+      LightVertex v = bounce.vertex;
+      v.weight = bounce.left(state.flux);
+      if (!isBlack(v.weight)) visit(v, bounce.lambertian ? nullptr : &bounce.scattering);
     }
-    const BsdfSample s = side.bsdf->sample(side.wo, pair(state, sampler), one(state, sampler));
-    if (!(s.pdf > 0) || isBlack(s.weight)) return false;
-    const Vec3 w = side.frame.toWorld(s.wi);
-    if (side.leaks(w, s.wi)) return false;
-    const bool passes = side.bsdf->isThin() && s.wi.z * side.wo.z < 0;
-    state.at = leaveSurface(scene_, point, wi, w, media);
-    // The bsdf's sample is that of radiance, which refraction scales and which knows the shading normal's cosine alone.
-    Rgb next = state.flux * s.weight * square(s.eta);
-    if (!specular) next *= std::fabs(side.wo.z * dot(w, point.geometricNormal) / (s.wi.z * arrival));
-    if (passes) {
+    const Rgb next = bounce.carried(state.flux);
+    if (isBlack(next)) return false;
+    state.at = bounce.onward;
+    if (bounce.passes) {
       state.flux = next;
       return true;
     }

@@ -79,18 +79,25 @@ VIRGA_HD bool walkMajorants(const CoarseGridView& grid, Vec3 o, Vec3 d, float t0
   return true;
 }
 
-/// Pieces of [t0, t1] along a world-space ray, each with a bound of the density: the grid's cells inside its support,
-/// its background outside. visit(a, b, majorant, inside) until it returns false.
+/// Pieces of [t0, t1] along a ray in index coordinates, each with the number of the coarse cell that it lies in;
+/// outside the grid's support its background. visit(a, b, number, inside) until it returns false.
 template <class Visit>
-VIRGA_HD void forEachMajorant(const GridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
+VIRGA_HD void forEachCoarseCell(const GridView& grid, const CoarseGridView& cells, Vec3 o, Vec3 d, float t0, float t1,
+                                Visit&& visit) {
   const ClippedRange in = clipToBox(o, d, grid.supportLo, grid.supportHi, t0, t1);
   const bool meets = in.t0 < in.t1;
   if (grid.background > 0 && !visit(t0, meets ? in.t0 : t1, grid.background, false)) return;
   if (!meets) return;
-  if (!walkMajorants(grid.majorant, o, d, in.t0, in.t1,
+  if (!walkMajorants(cells, o, d, in.t0, in.t1,
                      [&](float a, float b, float majorant) { return visit(a, b, majorant, true); }))
     return;
   if (grid.background > 0) visit(in.t1, t1, grid.background, false);
+}
+
+/// Likewise, each with a bound of the density: visit(a, b, majorant, inside).
+template <class Visit>
+VIRGA_HD void forEachMajorant(const GridView& grid, Vec3 o, Vec3 d, float t0, float t1, Visit&& visit) {
+  forEachCoarseCell(grid, grid.majorant, o, d, t0, t1, visit);
 }
 
 /// A ray in the index coordinates of a medium's grid; t stays the same.

@@ -55,6 +55,13 @@ void append(VirtualLights& all, const VirtualLights& block) {
 
 }  // namespace
 
+VirtualLights joined(const std::vector<VirtualLights>& parts) {
+  VirtualLights all;
+  for (const VirtualLights& part : parts) append(all, part);
+  all.firstOf.push_back(static_cast<uint32_t>(all.lights.size()));
+  return all;
+}
+
 WalkStarts::WalkStarts(const Scene& scene) : scene_(scene), endless_(endlessMedium(scene)) {}
 
 WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
@@ -82,10 +89,7 @@ VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options,
     parts[static_cast<size_t>(b)] =
         traceBlock(scene, starts, options, id, first, std::min(first + kBlock, options.walks));
   });
-  VirtualLights all;
-  for (const VirtualLights& part : parts) append(all, part);
-  all.firstOf.push_back(static_cast<uint32_t>(all.lights.size()));
-  return all;
+  return joined(parts);
 }
 
 }  // namespace virga

@@ -26,6 +26,9 @@ VIRGA_HD inline Rgb intensity(const VirtualLights& lights, const SceneView& scen
   return light.weight * scene.media[light.medium].phaseAt(light.p).value(w, light.wi);
 }
 
+/// One list after the other.
+VirtualLights joined(const std::vector<VirtualLights>& parts);
+
 struct WalkOptions {
   int walks = 1024;
   int maxDepth = -1;  ///< scattering events; -1: no limit
@@ -53,10 +56,12 @@ class WalkStarts {
     Rgb flux;  ///< [W]; black if no walk leaves
   };
   Start sample(Sampler& sampler) const;
+  /// The medium that is around everything, or MediaState::kNone.
+  int endless() const { return endless_; }
 
  private:
   const Scene& scene_;
-  int endless_;  ///< index of the medium that is around everything, or MediaState::kNone
+  int endless_;
 };
 
 }  // namespace virga

@@ -311,7 +311,8 @@ TEST(ImsRobustness, MediaThatGlow) {
     return brightness(rendered(scene, {.passes = 64, .method = method, .settings = settings}).film());
   };
   const double truth = beauty("path", {});
-  for (const char* mode : {"exact", "fast", "frame"}) EXPECT_NEAR(beauty("ims", {{"mode", mode}}), truth, 0.02 * truth) << mode;
+  for (const char* mode : {"exact", "fast", "frame"})
+    EXPECT_NEAR(beauty("ims", {{"mode", mode}}), truth, 0.02 * truth) << mode;
 }
 
 // --- lights where they are hard: means agree with path by a ratio, for tails are heavy ---

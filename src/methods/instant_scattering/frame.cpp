@@ -46,7 +46,8 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   if (lights_ && lightsOf_ == index && around == around_) return true;
   lights_ = nullptr;
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
-  VirtualLights traced = traceVirtualLights(scene, {options.walks, maxDepth, options.flights}, {seed, 0, 0, index}, stop);
+  VirtualLights traced =
+      traceVirtualLights(scene, {options.walks, maxDepth, options.flights}, {seed, 0, 0, index}, stop);
   FrameLights::Options kept;
   kept.most = options.frameLights;
   kept.turn = FixedNumbers{index}.shift();

@@ -278,8 +278,8 @@ void FrameLights::lookFrom(size_t i, const KernelReceivers& to, EndKind kind, fl
       lookThroughTable(light, to, {&depth_[table * DepthTable::kSize], views_[i]}, seen[c]);
     if (maps_.empty()) continue;
     lookThroughMap(light, to, kind,
-                   {&maps_[i * texelsOfMap()], mapSide_,
-                    ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_), ShadowMapsView::kLeastCosine},
+                   {&maps_[i * texelsOfMap()], mapSide_, ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_),
+                    ShadowMapsView::kLeastCosine},
                    seen[c]);
   }
 }

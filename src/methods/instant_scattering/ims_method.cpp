@@ -2,6 +2,7 @@
 #include "methods/instant_scattering/ims_method.h"
 
 #include "methods/instant_scattering/frame.h"
+#include "transport/kept_walks.h"
 
 namespace virga {
 namespace {
@@ -15,6 +16,7 @@ class ImsMethod final : public Method {
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
+    walks_.edit(*scene_, *next, changes);
     scene_ = std::move(next);
     upsampling_ = nullptr;
     points_ = {};
@@ -37,10 +39,7 @@ class ImsMethod final : public Method {
     }
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
-    const VirtualLights lights = traceVirtualLights(
-        *scene_,
-        {options.walks, options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2), options.flights},
-        {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
+    const VirtualLights lights = lightsOf(index, options, {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
     const bool maps = options.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
     if (maps && points_.cells() == 0) points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
@@ -58,6 +57,13 @@ class ImsMethod final : public Method {
  private:
   /// Keeps the walks' random numbers apart from the pixels'.
   static constexpr uint64_t kWalkSeed = 0x6c62272e07bb0142ull;
+
+  VirtualLights lightsOf(int64_t pass, const ImsOptions& options, SampleId id, std::stop_token stop) {
+    const int maxDepth = options.path.maxDepth;
+    const WalkOptions walks{options.walks, maxDepth < 0 ? -1 : std::max(0, maxDepth - 2), options.flights};
+    if (options.retrace >= 1) return traceVirtualLights(*scene_, walks, id, stop);
+    return walks_.lights(*scene_, walks, id, pass, options.retrace, stop);
+  }
 
   void exactPass(const ImsPixels& pixels, SampleId id, std::stop_token stop, PassFrame& frame) const {
     forEachPixel(frame, stop, [&](int x, int y) {
@@ -127,6 +133,7 @@ class ImsMethod final : public Method {
   static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
 
   SceneSnapshot scene_;
+  WalkStore walks_;                         ///< from frame to frame, if any are kept
   std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
   SurfacePoints points_;                    ///< likewise
   FrameRenderer renderer_;                  ///< likewise, for frames

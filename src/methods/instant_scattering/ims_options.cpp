@@ -85,6 +85,11 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   walks_ = reader.integer("walks", 1);
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
+  o.retrace = reader.share("retrace").value_or(o.retrace);
+  if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
+    throw Error("--set ims.retrace needs ims.mode=exact or fast: a frame traces its walks when the scene changes");
+  if (o.retrace < 1 && o.flights == FlightMode::marching)
+    throw Error("--set ims.retrace needs ims.walk_flights=tracking: kept walks have flights of their own");
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
@@ -148,6 +153,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
           {"walk_flights", wordOf(kFlights, o.flights)},
+          {"retrace", fmt::format("{}", o.retrace)},
           {"lights", std::to_string(isFrame ? o.frameLights : o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},
           {"radius", byLights ? "by the lights" : fmt::format("{}", c.radius)},

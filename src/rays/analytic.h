@@ -6,8 +6,8 @@
 #include "core/transform.h"
 #include "core/vec.h"
 
-/// Shapes that are no meshes, as rays and searches meet them. Of no use beside RayScene.
-namespace virga {
+// Shapes that a line meets by a formula, for RayShape.
+namespace virga::analytic {
 
 struct Sphere {
   Vec3 center;
@@ -24,7 +24,7 @@ struct Cylinder {
 struct Box {
   Affine toLocal;
 };
-using Analytic = std::variant<Sphere, Disk, Cylinder, Box>;
+using Shape = std::variant<std::monostate, Sphere, Disk, Cylinder, Box>;
 
 /// One point where a line meets an analytic shape.
 struct LineHit {
@@ -155,4 +155,4 @@ inline float distanceToTriangle(Vec3 p, Vec3 a, Vec3 b, Vec3 c) {
   return distance(p, a + (ab * vb + ac * vc) / (va + vb + vc));
 }
 
-}  // namespace virga
+}  // namespace virga::analytic
