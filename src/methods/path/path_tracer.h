@@ -1,25 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "core/sampler.h"
-#include "image/layers.h"
-#include "transport/equiangular.h"
-#include "transport/lamp_guide.h"
+#include "methods/path/eye_path.h"
 #include "transport/roulette.h"
 #include "transport/visibility.h"
 
 namespace virga {
-
-struct PathOptions {
-  /// What light is looked for. Lamps: all but media that glow.
-  enum class Sources { all, lamps, glow };
-
-  int maxDepth = -1;  ///< segments; -1: no limit
-  int rrDepth = 5;    ///< scattering events before Russian roulette
-  int equiangularDepth =
-      1;  ///< segments on which technique B aims at all lights; at small ones and those in thin fog it always does
-  Sources sources = Sources::all;
-};
 
 /// Unidirectional volumetric path tracing with next-event estimation and multiple importance sampling. Unbiased.
 ///
@@ -41,45 +27,8 @@ class PathTracer {
         glow_(scene.emissive && options.sources != PathOptions::Sources::lamps),
         aims_(lamps_ && hasLightsToAimAt(scene)) {}
 
-  /// How the last vertex chose the ray's direction: what multiple importance sampling needs when the ray meets a light.
-  struct LastVertex {
-    Vec3 p;
-    float pdf = 0;           ///< [1/sr]
-    bool connected = false;  ///< it sampled the lights too; not so the camera and specular vertices
-    float t = 0;             ///< its place on `segment`, if that is active: it could have been found by technique B
-    EquiangularSegment segment;
-  };
-
-  /// A vertex, and what the path had carried to it.
-  struct Record {
-    Vertex vertex;
-    Rgb throughput;
-  };
-  /// The last vertex, if the light of virtual lights was gathered there (`ims`): then only what their clamping took of
-  /// the light from the next vertex is still to be found.
-  struct Link {
-    bool active = false;
-    Vec3 p;
-    Vec3 normal;  ///< 0 in a medium
-  };
-
-  struct Path {
-    MediaRay at;
-    float tMax = kInfinity;
-    Rgb throughput{1, 1, 1};
-    float etaScale = 1;  ///< product of squared relative indices: keeps the radiance scaling out of Russian roulette
-    int depth = 0;       ///< scattering events so far
-    LastVertex last;
-    LayerPath layers;
-    LayerRadiance radiance;
-    Record* record = nullptr;  ///< where to write down vertices that virtual lights can light; null: nowhere
-    float bound = 0;           ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
-    Link link;
-    LampGuide lamp;                ///< of the last vertex, for technique B on the next segment
-    float guided = 1, before = 1;  ///< what guides did to the throughput at the last vertex and at the one before
-
-    VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
-  };
+  using Path = EyePath;
+  using Record = EyePath::Record;
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler) const {
@@ -106,7 +55,7 @@ class PathTracer {
     MediaState segmentMedia;
     EquiangularSegment segment;
     Collision collision;
-    SpectralFlight spectral(path.throughput, scene_.chromatic ? one(path, sampler) : 0.f);
+    SpectralFlight spectral(path.throughput, scene_.chromatic ? path.one(sampler) : 0.f);
     Rgb glow;
     bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
@@ -147,37 +96,11 @@ class PathTracer {
   }
 
  private:
-  /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
-  static constexpr int kStratifiedBounces = 4;
-  VIRGA_HD static Vec2 pair(const Path& path, Sampler& sampler) {
-    return path.depth < kStratifiedBounces ? sampler.next2D() : sampler.random2D();
-  }
-  VIRGA_HD static float one(const Path& path, Sampler& sampler) {
-    return path.depth < kStratifiedBounces ? sampler.next1D() : sampler.random();
-  }
   /// Power heuristic (exponent 2) of a technique against up to two others.
   VIRGA_HD static float weight(float own, float other, float third = 0) {
     return own > 0 ? 1 / (1 + square(other / own) + square(third / own)) : 0;
   }
   VIRGA_HD bool mayScatter(const Path& path) const { return mayScatter(path.depth); }
-
-  // --- what virtual lights have left (ims) ---
-
-  /// The share of the light from x, with `normal` (0 in a medium), that the clamping of virtual lights took at the last
-  /// vertex: max(0, G - b) / G; all of it where none were gathered.
-  VIRGA_HD static float clampedShare(const Path& path, Vec3 x, Vec3 normal) {
-    if (!path.link.active) return 1;
-    return clampedShareOf(geometryTerm(path.link.p, path.link.normal, x, normal), path.bound);
-  }
-  VIRGA_HD static bool survivesClamping(const Path& path, Vec3 x, Vec3 normal, Sampler& sampler) {
-    const float q = clampedShare(path, x, normal);
-    return q == 1 || (q > 0 && sampler.random() < q);
-  }
-  /// After a vertex that is written down the path is linked to virtual lights.
-  VIRGA_HD static void record(Path& path, const Vertex& vertex) {
-    *path.record = {vertex, path.throughput};
-    path.link = {true, vertex.p, vertex.normal()};
-  }
 
   VIRGA_HD EquiangularSegment equiangularSegment(const Path& path, const MediaRay& r, float t0, float t1) const {
     const bool largeLights = lamps_ && path.depth < options_.equiangularDepth;
@@ -215,7 +138,7 @@ class PathTracer {
     const EmitterView& emitter = scene_.emitters[shape.emitter];
     if (dot(point.geometricNormal, path.at.ray.d) >= 0) return;
     float w = 1;
-    const LastVertex& last = path.last;
+    const EyePath::LastVertex& last = path.last;
     if (last.connected) {
       const float choice = scene_.emitterChoice.probability(shape.emitter);
       const float connection = choice * areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
@@ -246,10 +169,10 @@ class PathTracer {
 
   /// Nothing for lights that technique B finds by itself on the segment to x.
   VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, Sampler& sampler) const {
-    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
+    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
     const EmitterView& emitter = scene_.emitters[choice.index];
     if (path.last.segment.replacesFlights(emitter)) return {};
-    return {sampleLight(scene_, emitter, x, pair(path, sampler)), choice.index, choice.probability};
+    return {sampleLight(scene_, emitter, x, path.pair(sampler)), choice.index, choice.probability};
   }
 
   VIRGA_HD bool hasLights() const {
@@ -257,9 +180,9 @@ class PathTracer {
   }
 
   VIRGA_HD LampGuide drawLamp(const Path& path, Sampler& sampler) const {
-    const auto choice = scene_.emitterChoice.sample(one(path, sampler));
+    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
     const EmitterView& emitter = scene_.emitters[choice.index];
-    const Vec2 u = pair(path, sampler);
+    const Vec2 u = path.pair(sampler);
     LampGuide lamp;
     lamp.emitter = choice.index, lamp.choice = choice.probability;
     if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
@@ -286,13 +209,13 @@ class PathTracer {
     const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
     const LightPoint& on = lamp.on;
-    const float uDistance = one(path, sampler);
+    const float uDistance = path.one(sampler);
     if (!segment.aimsAt(emitter)) return;
     const EquiangularSegment::Sample distance = segment.sample(on.p, uDistance);
     if (!(distance.pdf > 0)) return;
     const Vec3 x = segment.ray.at(distance.t), wo = -segment.ray.d;
     const LightSample light = towardPoint(emitter, x, on);
-    const float share = clampedShare(path, x, Vec3(0));
+    const float share = path.clampedShare(x, Vec3(0));
     if (!(light.pdf > 0) || !(share > 0) || isBlack(light.radiance)) return;
 
     const MediumView& medium = scene_.media[segment.medium];
@@ -362,17 +285,17 @@ class PathTracer {
     if (!mayScatter(path)) return false;
     const MediumView& medium = scene_.media[collision.medium];
     const Vec3 x = path.at.ray.at(collision.t), wo = -path.at.ray.d;
-    if (!survivesClamping(path, x, Vec3(0), sampler)) return false;
-    if (path.record) record(path, Vertex::inMedium(scene_, collision.medium, x, wo, media));
+    if (!path.survivesClamping(x, Vec3(0), sampler)) return false;
+    if (path.record) path.writeDown(Vertex::inMedium(scene_, collision.medium, x, wo, media));
     path.throughput *= medium.albedoAt(x);
-    LastVertex last{x, 0, true, collision.t, {}};
+    EyePath::LastVertex last{x, 0, true, collision.t, {}};
     if (segment.contains(collision.t) && collision.medium == segment.medium) last.segment = segment;
     return leaveMedium(path, medium.phaseAt(x), media, x, wo, last, sampler);
   }
 
   /// Connects the lights at a vertex in a medium, and goes on from it.
   VIRGA_HD bool leaveMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
-                            const LastVertex& last, Sampler& sampler) const {
+                            const EyePath::LastVertex& last, Sampler& sampler) const {
     if (isBlack(path.throughput)) return false;
     path.layers.scatter(VertexKind::medium);
     path.last = last;
@@ -380,11 +303,11 @@ class PathTracer {
 
     path.lamp = guideFrom(path, media, x, sampler);
     PhaseSample s;
-    if (path.lamp.guides && one(path, sampler) < LampGuide::kShare) {
-      s.wi = path.lamp.sample(Vec3(0), pair(path, sampler));
+    if (path.lamp.guides && path.one(sampler) < LampGuide::kShare) {
+      s.wi = path.lamp.sample(Vec3(0), path.pair(sampler));
       s.value = phase.value(wo, s.wi), s.pdf = phase.pdf(wo, s.wi);
     } else {
-      s = phase.sample(wo, pair(path, sampler));
+      s = phase.sample(wo, path.pair(sampler));
     }
     if (!(s.pdf > 0)) return false;
     path.guided = path.lamp.share(s.pdf, Vec3(0), s.wi);
@@ -405,7 +328,7 @@ class PathTracer {
     Bsdf textured;
     const Side side = sideOf(scene_, point, hit, wo, textured);
     if (side.bsdf->isThin()) {
-      const BsdfSample s = side.bsdf->sample(side.wo, {}, one(path, sampler));
+      const BsdfSample s = side.bsdf->sample(side.wo, {}, path.one(sampler));
       if (s.wi.z * side.wo.z < 0) return passStraight(path, point, s.weight, media, hit.t);
       path.layers.scatterSpecularly();
       path.link = {};
@@ -419,8 +342,8 @@ class PathTracer {
       path.link = {};
     } else {
       if (path.record && side.bsdf->broad()) {
-        if (!survivesClamping(path, point.p, point.geometricNormal, sampler)) return false;
-        record(path, Vertex::onSurface(point, side, wo, media));
+        if (!path.survivesClamping(point.p, point.geometricNormal, sampler)) return false;
+        path.writeDown(Vertex::onSurface(point, side, wo, media));
       } else {
         path.link = {};
       }
@@ -436,15 +359,15 @@ class PathTracer {
                                  Sampler& sampler) const {
     path.lamp = side.bsdf->broad() ? guideFrom(path, media, point.p, sampler) : LampGuide{};
     path.guided = 1;
-    if (!path.lamp.guides) return side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+    if (!path.lamp.guides) return side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
     const Vec3 n = dot(point.geometricNormal, path.at.ray.d) < 0 ? point.geometricNormal : -point.geometricNormal;
     BsdfSample s;
-    if (one(path, sampler) < LampGuide::kShare) {
-      s.wi = side.frame.toLocal(path.lamp.sample(n, pair(path, sampler)));
+    if (path.one(sampler) < LampGuide::kShare) {
+      s.wi = side.frame.toLocal(path.lamp.sample(n, path.pair(sampler)));
       s.pdf = side.bsdf->pdf(side.wo, s.wi);
       if (s.pdf > 0) s.weight = side.bsdf->value(side.wo, s.wi) * (std::fabs(s.wi.z) / s.pdf);
     } else {
-      s = side.bsdf->sample(side.wo, pair(path, sampler), one(path, sampler));
+      s = side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
     }
     path.guided = s.pdf > 0 ? path.lamp.share(s.pdf, n, side.frame.toWorld(s.wi)) : 1;
     s.weight *= path.guided;
