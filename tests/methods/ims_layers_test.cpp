@@ -159,7 +159,7 @@ TEST(ImsLayers, MediaThatGlow) {
                    {Layer::directMedia, 0.005},
                    {Layer::surfaceToSurface, 0.035},
                    {Layer::mediaToSurface, 0.025},
-                   {Layer::surfaceToMedia, 0.01},
+                   {Layer::surfaceToMedia, 0.012},
                    {Layer::mediaToMedia, 0.01}},
                   {.sets = 12}, {.radii = {0.25, 1}});
 }

@@ -175,13 +175,21 @@ TEST_F(ImsOptionsTest, BiasIsDeclared) {
                                   {{"transmittance", "mean"}, {"compensation", "sampled"}},
                                   {{"levels", "1"}, {"ending", "nothing"}, {"compensation", "sampled"}},
                                   {{"levels", "1"}, {"ending", "reduced"}, {"compensation", "sampled"}}};
-  const SettingValues unbiased[] = {{},
-                                    {{"compensation", "sampled"}},
-                                    {{"levels", "1"}, {"compensation", "sampled"}},
-                                    {{"transmittance", "mean"}},
-                                    {{"levels", "1"}, {"ending", "nothing"}}};
+  const SettingValues unbiased[] = {{}, {{"compensation", "sampled"}}, {{"levels", "1"}, {"compensation", "sampled"}}};
   for (const SettingValues& settings : biased) EXPECT_TRUE(flaggedBiased(scene_, settings)) << settings.begin()->first;
   for (const SettingValues& settings : unbiased) EXPECT_FALSE(flaggedBiased(scene_, settings));
+}
+
+TEST_F(ImsOptionsTest, WhatWouldDoNothingIsRefused) {
+  const SettingValues idle[] = {{{"transmittance", "mean"}},
+                                {{"levels", "1"}, {"ending", "nothing"}},
+                                {{"map_points", "100"}},
+                                {{"samples", "4"}},
+                                {{"mode", "frame"}, {"paths", "4"}}};
+  for (const SettingValues& settings : idle) EXPECT_THROW(flaggedBiased(scene_, settings), Error);
+}
+TEST_F(ImsOptionsTest, WalksThatFillTheMemoryAreRefused) {
+  EXPECT_THROW(flaggedBiased(scene_, {{"walks", "300000000"}}), Error);
 }
 
 TEST(ImsBias, TheLocalMeanIsNotTheTransmittance) {

@@ -193,7 +193,7 @@ TEST(LayersOfMedia, LampsInside) {
                    {Layer::mediaToMedia, 0.009}},
                   {{"fog 15 % denser", {Layer::mediaToMedia}, denser(0, 1.15)},
                    {"ball 20 % denser", {Layer::emission}, denser(1, 1.2)},
-                   {"smoke twice as dense", {Layer::directMedia}, denser(2, 2)},
+                   {"smoke three times as dense", {Layer::directMedia}, denser(2, 3)},
                    {"glass 40 % denser", {Layer::emission}, denser(3, 1.4)}},
                   {.passes = 640, .samples = 3500});
 }

@@ -244,7 +244,7 @@ TEST(Layers, PointLightIsASmallSphere) {
   expectAgreement(point, sphere,
                   {{Layer::directSurface, 0.01},
                    {Layer::directMedia, 0.01},
-                   {Layer::surfaceToSurface, 0.02},
+                   {Layer::surfaceToSurface, 0.03},
                    {Layer::mediaToSurface, 0.03},
                    {Layer::surfaceToMedia, 0.035},
                    {Layer::mediaToMedia, 0.02}},

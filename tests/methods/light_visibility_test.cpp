@@ -85,16 +85,10 @@ TEST(MinimumDepth, WhereThereIsNothing) {
 
 Image pictureOf(const SceneSnapshot& scene, const std::string& visibility, const std::string& compensation,
                 int passes = 8) {
-  return rendered(scene, {.passes = passes,
-                          .method = "ims",
-                          .settings = {{"visibility", visibility},
-                                       {"compensation", compensation},
-                                       {"radius", "0.5"},
-                                       {"map_resolution", "64"},
-                                       {"map_points", "2000"},
-                                       {"walks", "40"}}})
-      .film()
-      .beauty();
+  SettingValues settings = {
+      {"visibility", visibility}, {"compensation", compensation}, {"radius", "0.5"}, {"walks", "40"}};
+  if (visibility == "shadow_map") settings.insert({{"map_resolution", "64"}, {"map_points", "2000"}});
+  return rendered(scene, {.passes = passes, .method = "ims", .settings = settings}).film().beauty();
 }
 
 // Only rays are left out that would have met nothing: each sample is the same.

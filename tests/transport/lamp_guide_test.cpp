@@ -14,8 +14,8 @@ const Vec3 kNormals[] = {Vec3(0), kAxis, -kAxis, normalize(cross(kAxis, Vec3(1, 
 
 LampGuide guideToward(Vec3 axis) {
   LampGuide guide;
-  guide.guides = true;
   guide.axis = axis;
+  guide.guide(1, 1);
   return guide;
 }
 
@@ -37,8 +37,8 @@ TEST(LampGuide, AWrongDensityIsNoticed) {
 TEST(LampGuide, LeavesTheSideOfTheSurfaceToOthers) {
   const LampGuide guide = guideToward(kAxis);
   EXPECT_EQ(guide.pdf(kAxis, -kAxis), 0);
-  EXPECT_FLOAT_EQ(guide.share(0.25f, kAxis, -kAxis), 1 / (1 - LampGuide::kShare));
-  EXPECT_EQ(LampGuide{}.share(0.25f, kAxis, kAxis), 1);
+  EXPECT_FLOAT_EQ(guide.mixture(0.25f, kAxis, -kAxis), 0.25f * (1 - LampGuide::kMostShare));
+  EXPECT_EQ(LampGuide{}.mixture(0.25f, kAxis, kAxis), 0.25f);
 }
 
 }  // namespace

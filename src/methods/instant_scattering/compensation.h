@@ -21,7 +21,7 @@ struct CompensationOptions {
   bool localMeanTransmittance = false;  ///< exp(-s t) with the local mean s in place of the true one
 };
 
-/// The recursive bias compensation of the paper (section 5): near a vertex x new vertices x' are sampled, with
+/// The recursive bias compensation of the paper (section 4.4): near a vertex x new vertices x' are sampled, with
 /// distances from a density restricted to the clamping radius, and what they scatter toward x counts by
 /// max(0, G - b) / G. Unbiased unless an option says otherwise.
 template <class Rays>

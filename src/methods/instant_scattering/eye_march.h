@@ -109,7 +109,7 @@ struct MarchedEye {
   Side side;
   Bsdf textured;
 
-  bool broad = true;  ///< no mirror, glass or narrow bsdf is met
+  bool plain = true;  ///< no mirror, glass or narrow bsdf is met, and no more stretches than can be kept
 
   VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
 
@@ -143,11 +143,12 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
   if (eye.hit.found()) {
     eye.point = surfacePoint(scene.surfaces[eye.hit.shape], eye.at.ray, eye.hit, scene.scale);
     eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
-    eye.broad = eye.side.bsdf->broad();
+    eye.plain = eye.side.bsdf->broad();
   }
   walkMedia(scene, rays, eye.at, eye.hit.found() ? eye.hit.t : camera.tMax, [&](float t0, float t1) {
     if (eye.at.media.vacuum()) return true;
     const bool kept = eye.stretches < MarchedEye::kMostStretches;
+    eye.plain &= kept;
     if (kept) eye.media[eye.stretches] = eye.at.media;
     marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, MarchedEye::kSteps, shift, [&](float a, float b, Rgb here) {
       if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))

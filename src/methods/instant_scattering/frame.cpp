@@ -64,7 +64,9 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
                          const std::stop_token& stop, PassFrame& frame) {
   if (!prepareLights(scene, options, seed, index, stop)) return false;
   ImsOptions own = options;
-  if (!(own.frame.near.bound > 0)) own.frame.near.bound = 1 / square(kRadiusSpacings * lights_->spacing());
+  const float spacing = lights_->spacing();  // none, if they all lie in a plane
+  if (!(own.frame.near.bound > 0))
+    own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
   const FramePixels pixels(scene, *lights_, own, index);
   own.compensate = ImsOptions::Compensate::path;  // of pixels that are left to paths
   using Seen = LightVisibilityOptions::Mode;

@@ -12,8 +12,8 @@ bool FramePixels::direct(int x, int y, PixelFeatures& features, LayerRadiance& r
   MarchedEye eye;
   marchEye(scene_.view, rays_, cameraRay(x, y), numbers_.shift(), eye);
   features = pixelFeatures(eye);
-  if (eye.broad) marched_.add(eye, radiance, numbers_);
-  return eye.broad;
+  if (eye.plain) marched_.add(eye, radiance, numbers_);
+  return eye.plain;
 }
 
 template <class Visit>
@@ -39,7 +39,7 @@ std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<co
   for (size_t n = 0; n < pixels.size(); ++n) {
     MarchedEye eye;
     marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye);
-    if (!eye.broad) continue;
+    if (!eye.plain) continue;
     light[n].emplace();
     visitReceivers(eye, [&](Receiver r) {
       r.pixel = static_cast<int>(n);

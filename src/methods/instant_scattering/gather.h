@@ -38,7 +38,7 @@ class Gatherer {
     KnownSpace known;
     if (lights_.lights.empty()) return known;
     const int all = amount.walks > 0 ? lights_.walks() : static_cast<int>(lights_.lights.size());
-    const int count = amount.walks > 0 ? std::min(amount.walks, all) : amount.lights;
+    const int count = amount.walks > 0 ? std::min(amount.walks, all) : std::min(amount.lights, all);
     // One of each of as many equal parts of the list: neighbours in it are of one walk.
     const float share = static_cast<float>(all) / static_cast<float>(count) / static_cast<float>(lights_.walks());
     const double start = static_cast<double>(sampler.random());

@@ -12,10 +12,12 @@ class ImsMethod final : public Method {
   void prepare(SceneSnapshot scene, const Settings& settings, LayerMask) override {
     scene_ = std::move(scene);
     settings_ = ImsSettings(settings);
+    settings_.forScene(*scene_);  // throws for what is out of proportion to it
     seed_ = settings.seed;
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
+    settings_.forScene(*next);
     walks_.edit(*scene_, *next, changes);
     scene_ = std::move(next);
     upsampling_ = nullptr;

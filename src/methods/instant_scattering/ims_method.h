@@ -10,7 +10,8 @@ inline constexpr SettingInfo kImsSettings[] = {
      "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing "
      "is drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
     {"samples", "16; frame: 8",
-     "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit"},
+     "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit, or paths where it "
+     "sees a mirror or glass"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
     {"walks", "8192; 256 with shadow maps; frame: 16384", "random walks from the lights in each pass"},
     {"walk_flights", "tracking",
@@ -37,8 +38,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"visibility", "exact; frame: shadow_map",
      "of virtual lights: exact; minimum_depth: exact, without rays where nothing can be in the way (not in frames); "
      "shadow_map, none (biased)"},
-    {"map_resolution", "128", "shadow_map: of each light's map, texels in either direction"},
-    {"map_points", "8192", "shadow_map: points of the scene's surfaces in each light's map"},
+    {"map_resolution", "128; frame: 64", "shadow_map: of each light's map, texels in either direction"},
+    {"map_points", "8192; frame: 500", "shadow_map: points of the scene's surfaces in each light's map"},
     {"show", "picture", "picture; lost: only what clamping takes; compensation: only what is found again"},
     {"max_depth", "the scene's", "longest path in segments, -1 for no limit; 2 is direct light"},
     {"rr_depth", "the scene's", "scattering events of the eye path before Russian roulette by throughput begins"},

@@ -23,6 +23,8 @@ constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 constexpr int kWalks = 8192, kWalksWithMaps = 256, kFrameWalks = 16384;
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
+/// Each leaves some lights of 64 bytes.
+constexpr int kMostWalks = 1 << 22;
 /// Of a frame, whose thousand lights share smaller maps' memory.
 constexpr int kFramePoints = 8, kFrameMapResolution = 64, kFrameMapPoints = 500;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
@@ -78,12 +80,37 @@ bool ImsOptions::biased() const {
          (compensation.levels >= 0 && compensation.ending != CompensationOptions::Ending::unclamped);
 }
 
+namespace {
+
+/// A setting that would change nothing is a mistake.
+void refuseIdle(const Settings& settings, bool idle, std::initializer_list<std::string_view> names,
+                std::string_view needs) {
+  if (!idle) return;
+  for (const std::string_view name : names)
+    if (settings.values.contains(name))
+      throw Error(fmt::format("--set ims.{} needs {}: here it would do nothing", name, needs));
+}
+
+void refuseIdle(const Settings& settings, const ImsOptions& o) {
+  refuseIdle(settings, o.compensate != ImsOptions::Compensate::sampled,
+             {"levels", "ending", "v1", "v2", "p1", "p2", "transmittance"}, "ims.compensation=sampled");
+  refuseIdle(settings, o.visibility.mode != LightVisibilityOptions::Mode::shadowMap, {"map_resolution", "map_points"},
+             "ims.visibility=shadow_map");
+  refuseIdle(settings, o.mode == ImsOptions::Mode::exact, {"samples", "spacing"}, "ims.mode=fast or frame");
+  refuseIdle(settings, o.mode == ImsOptions::Mode::frame, {"paths"}, "ims.mode=exact or fast");
+}
+
+}  // namespace
+
 ImsSettings::ImsSettings(const Settings& settings) {
   const SettingsReader reader(settings, kImsSettings, "ims");
   ImsOptions& o = given_;
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   walks_ = reader.integer("walks", 1);
+  if (walks_ && *walks_ > kMostWalks)
+    throw Error(fmt::format("--set ims.walks may be at most {}", kMostWalks),
+                {{}, "ask for more passes instead: each has walks of its own", {}});
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.retrace = reader.share("retrace").value_or(o.retrace);
   if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
@@ -121,6 +148,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);
   rrDepth_ = reader.integer("rr_depth", 1);
+  refuseIdle(settings, o);
 }
 
 ImsOptions ImsSettings::forScene(const Scene& scene) const {
@@ -137,7 +165,14 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
   if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
   o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
-  o.compensation.radius = radius_.value_or(kRadiusShare * extentOf(scene.view));
+  const float extent = extentOf(scene.view);
+  o.compensation.radius = radius_.value_or(kRadiusShare * extent);
+  constexpr float kLeast = 1e-6f, kMost = 1e3f;
+  if (o.compensation.radius < kLeast * extent || o.compensation.radius > kMost * extent)
+    throw Error(
+        fmt::format("ims.radius, or 1 / sqrt(ims.bound), is {} in a scene with an extent of {}: out of proportion",
+                    o.compensation.radius, extent),
+        {{}, fmt::format("choose a radius from {} to {}", kLeast * extent, kMost * extent), {}});
   o.gather.bound = 1 / square(o.compensation.radius);
   const bool spread = o.compensate == ImsOptions::Compensate::spread;
   o.frame.visibility = frameVisibility(o.visibility.mode);

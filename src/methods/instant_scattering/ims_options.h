@@ -40,6 +40,7 @@ class ImsSettings {
   /// Throws Error for settings that make no sense.
   explicit ImsSettings(const Settings& settings);
 
+  /// Throws Error for a clamping radius that is out of proportion to the scene.
   ImsOptions forScene(const Scene& scene) const;
 
  private:

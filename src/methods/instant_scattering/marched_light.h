@@ -87,8 +87,8 @@ class MarchedLight {
   VIRGA_HD bool add(const CameraRay& camera, LayerRadiance& radiance, Numbers numbers) const {
     MarchedEye eye;
     marchEye(scene_, rays_, camera, numbers.shift(), eye);
-    if (eye.broad) add(eye, radiance, numbers);
-    return eye.broad;
+    if (eye.plain) add(eye, radiance, numbers);
+    return eye.plain;
   }
   /// Of an eye ray that has been marched already and is broad.
   template <class Numbers>

@@ -55,8 +55,8 @@ struct EyePath {
   Record* record = nullptr;  ///< where to write down vertices that virtual lights can light; null: nowhere
   float bound = 0;           ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
   Link link;
-  LampGuide lamp;                ///< of the last vertex, for technique B on the next segment
-  float guided = 1, before = 1;  ///< what guides did to the throughput at the last vertex and at the one before
+  LampGuide lamp;                 ///< of the last vertex, for technique B on the next segment
+  float promise = 1, before = 1;  ///< LampGuide::promise of the last direction and of the one before
 
   VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
 

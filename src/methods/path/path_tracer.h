@@ -197,8 +197,7 @@ class PathTracer {
     if (!emitter.isLocal() || emitter.medium != media.medium(0) || !fog.homogeneous) return lamp;
     const Vec3 toLamp = lamp.on.p - x;
     const float d = length(toLamp);
-    lamp.guides = d > 0 && fog.sigmaT * d < EquiangularSegment::kThin;
-    if (lamp.guides) lamp.axis = toLamp / d;
+    if (d > 0 && fog.sigmaT * d < EquiangularSegment::kThin) lamp.axis = toLamp / d;
     return lamp;
   }
 
@@ -302,16 +301,18 @@ class PathTracer {
     connectMedium(path, phase, media, x, wo, sampler);
 
     path.lamp = guideFrom(path, media, x, sampler);
+    if (path.lamp.hasAxis()) path.lamp.guide(phase.pdf(wo, path.lamp.axis), 1 / (4 * kPi));
     PhaseSample s;
-    if (path.lamp.guides && path.one(sampler) < LampGuide::kShare) {
+    if (path.lamp.share > 0 && path.one(sampler) < path.lamp.share) {
       s.wi = path.lamp.sample(Vec3(0), path.pair(sampler));
       s.value = phase.value(wo, s.wi), s.pdf = phase.pdf(wo, s.wi);
     } else {
       s = phase.sample(wo, path.pair(sampler));
     }
-    if (!(s.pdf > 0)) return false;
-    path.guided = path.lamp.share(s.pdf, Vec3(0), s.wi);
-    path.throughput *= s.value / s.pdf * path.guided;
+    const float density = path.lamp.mixture(s.pdf, Vec3(0), s.wi);
+    if (!(density > 0)) return false;
+    path.promise = path.lamp.promise(Vec3(0), s.wi);
+    path.throughput *= s.value / density;
     path.last.pdf = s.pdf;
     path.at = {{x, s.wi}, media, 0};
     path.tMax = kInfinity;
@@ -358,19 +359,22 @@ class PathTracer {
   VIRGA_HD BsdfSample sampleBsdf(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
                                  Sampler& sampler) const {
     path.lamp = side.bsdf->broad() ? guideFrom(path, media, point.p, sampler) : LampGuide{};
-    path.guided = 1;
-    if (!path.lamp.guides) return side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
+    path.promise = 1;
+    if (path.lamp.hasAxis()) path.lamp.guide(side.bsdf->pdf(side.wo, side.frame.toLocal(path.lamp.axis)), 1 / kTwoPi);
+    if (!(path.lamp.share > 0)) return side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
     const Vec3 n = dot(point.geometricNormal, path.at.ray.d) < 0 ? point.geometricNormal : -point.geometricNormal;
     BsdfSample s;
-    if (path.one(sampler) < LampGuide::kShare) {
+    if (path.one(sampler) < path.lamp.share) {
       s.wi = side.frame.toLocal(path.lamp.sample(n, path.pair(sampler)));
       s.pdf = side.bsdf->pdf(side.wo, s.wi);
-      if (s.pdf > 0) s.weight = side.bsdf->value(side.wo, s.wi) * (std::fabs(s.wi.z) / s.pdf);
+      s.weight =
+          side.bsdf->value(side.wo, s.wi) * (std::fabs(s.wi.z) / path.lamp.mixture(s.pdf, n, side.frame.toWorld(s.wi)));
     } else {
       s = side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
+      if (!(s.pdf > 0)) return s;
+      s.weight *= s.pdf / path.lamp.mixture(s.pdf, n, side.frame.toWorld(s.wi));
     }
-    path.guided = s.pdf > 0 ? path.lamp.share(s.pdf, n, side.frame.toWorld(s.wi)) : 1;
-    s.weight *= path.guided;
+    path.promise = path.lamp.promise(n, side.frame.toWorld(s.wi));
     return s;
   }
 
@@ -402,10 +406,10 @@ class PathTracer {
   }
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
-    // A guide makes the throughput small where the light that follows is bright: roulette looks past that.
-    const float unguided = path.guided * std::exchange(path.before, path.guided);
+    // Where guides make the throughput small the light that follows is bright.
+    const float promise = path.promise * std::exchange(path.before, path.promise);
     if (path.depth < options_.rrDepth) return true;
-    const float q = std::min(maxComponent(path.throughput) * path.etaScale / unguided, mostSurvival(path.depth));
+    const float q = std::min(maxComponent(path.throughput) * path.etaScale * promise, mostSurvival(path.depth));
     if (!(sampler.random() < q)) return false;
     path.throughput *= 1 / q;
     return true;
