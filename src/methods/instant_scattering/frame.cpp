@@ -16,20 +16,98 @@ constexpr float kRadiusSpacings = 2;
 constexpr int kDirectLayers = static_cast<int>(Layer::surfaceToSurface);
 using DirectLight = std::array<Rgb, kDirectLayers>;
 
-/// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same in each frame.
-Upsampling::Light sampled(const ImsPixels& pixels, Upsampling::Pixel p, SampleId id, int samples) {
-  Upsampling::Light light;
-  const float share = 1 / static_cast<float>(samples);
-  for (int s = 0; s < samples; ++s) {
-    id.index = static_cast<uint32_t>(s);
-    const LayerRadiance r = pixels.sample(p.x, p.y, id);
-    light.surface[0] += r.value[static_cast<int>(Layer::surfaceToSurface)] * share;
-    light.surface[1] += r.value[static_cast<int>(Layer::mediaToSurface)] * share;
-    light.media[0] += r.value[static_cast<int>(Layer::surfaceToMedia)] * share;
-    light.media[1] += r.value[static_cast<int>(Layer::mediaToMedia)] * share;
+/// One pass with its lights.
+class FramePass {
+ public:
+  FramePass(const Scene& scene, const FrameLights& lights, const ImsOptions& options, uint64_t seed, uint32_t index)
+      : scene_(scene),
+        options_(options),
+        id_{seed, 0, 0, index},
+        pixels_(scene, lights, options_, index),
+        paths_(scene, lights.virtualLights(), visibilityOfPaths(options), followed(options)) {}
+
+  bool run(const std::stop_token& stop, PassFrame& frame) {
+    width_ = frame.width();
+    std::vector<PixelFeatures> features = lightDirectly(frame, stop);
+    if (stop.stop_requested()) return false;
+    const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options_.spacing);
+    const std::vector<Upsampling::Light> light = indirectLight(upsampling.computed(), stop);
+    forEachPixel(frame, stop, [&](int x, int y) {
+      LayerRadiance radiance;
+      std::copy_n(direct_[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
+      upsampling.at(light, x, y).addTo(radiance);
+      radiance += paths_.sampleGlow(x, y, idOf(x, y));
+      frame.set(x, y, radiance);
+    });
+    return !stop.stop_requested();
   }
-  return light;
-}
+
+ private:
+  /// Fills direct_; what the pixels show.
+  std::vector<PixelFeatures> lightDirectly(const PassFrame& frame, const std::stop_token& stop) {
+    // Panes are looked through by paths alone, and paths of one segment see lamps alone.
+    const bool marches = !scene_.view.thinGlass && (options_.path.maxDepth < 0 || options_.path.maxDepth >= 2);
+    const size_t all = numberOf(0, frame.height());
+    std::vector<PixelFeatures> features(all);
+    direct_.resize(all);
+    forEachPixel(frame, stop, [&](int x, int y) {
+      LayerRadiance radiance;
+      if (!pixels_.direct(x, y, features[numberOf(x, y)], radiance) || !marches)
+        radiance = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+      std::copy_n(radiance.value, kDirectLayers, direct_[numberOf(x, y)].begin());
+    });
+    return features;
+  }
+
+  std::vector<Upsampling::Light> indirectLight(std::span<const Upsampling::Pixel> computed,
+                                               const std::stop_token& stop) const {
+    std::vector<Upsampling::Light> light(computed.size());
+    const auto groups = (static_cast<int64_t>(computed.size()) + kGroup - 1) / kGroup;
+    parallelFor(groups, 1, [&](int64_t n) {
+      if (stop.stop_requested()) return;
+      const size_t first = static_cast<size_t>(n) * kGroup;
+      const auto group = computed.subspan(first, std::min<size_t>(kGroup, computed.size() - first));
+      const auto found = pixels_.indirect(group);
+      for (size_t i = 0; i < group.size(); ++i) light[first + i] = found[i] ? *found[i] : sampled(group[i]);
+    });
+    return light;
+  }
+  /// Of a pixel that sees a mirror, glass or a narrow bsdf: it is left to a few paths, the same in each frame.
+  Upsampling::Light sampled(Upsampling::Pixel p) const {
+    Upsampling::Light light;
+    SampleId id = idOf(p.x, p.y);
+    for (int s = 0; s < options_.samples; ++s) {
+      id.index = static_cast<uint32_t>(s);
+      light.add(paths_.sample(p.x, p.y, id), 1 / static_cast<float>(options_.samples));
+    }
+    return light;
+  }
+
+  static ImsOptions followed(ImsOptions options) {
+    options.compensate = ImsOptions::Compensate::path;
+    return options;
+  }
+  static LightVisibilityView visibilityOfPaths(const ImsOptions& options) {
+    using Seen = LightVisibilityOptions::Mode;
+    return {options.visibility.mode == Seen::none ? Seen::none : Seen::exact};
+  }
+  SampleId idOf(int x, int y) const {
+    SampleId id = id_;
+    id.stream = scene_.camera.pixelStream(x, y);
+    return id;
+  }
+  size_t numberOf(int x, int y) const {
+    return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
+  }
+
+  const Scene& scene_;
+  ImsOptions options_;
+  SampleId id_;
+  FramePixels pixels_;  ///< refers to the members above
+  ImsPixels paths_;     ///< of pixels that are left to paths
+  int width_ = 0;
+  std::vector<DirectLight> direct_;
+};
 
 }  // namespace
 
@@ -67,56 +145,7 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
   const float spacing = lights_->spacing();  // none, if they all lie in a plane
   if (!(own.frame.near.bound > 0))
     own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
-  const FramePixels pixels(scene, *lights_, own, index);
-  own.compensate = ImsOptions::Compensate::path;  // of pixels that are left to paths
-  using Seen = LightVisibilityOptions::Mode;
-  const LightVisibilityView visibility{options.visibility.mode == Seen::none ? Seen::none : Seen::exact};
-  const ImsPixels paths(scene, lights_->virtualLights(), visibility, own);
-  const auto idOf = [&](int x, int y) { return SampleId{seed, 0, scene.camera.pixelStream(x, y), index}; };
-  const auto numberOf = [&](int x, int y) {
-    return static_cast<size_t>(y) * static_cast<size_t>(frame.width()) + static_cast<size_t>(x);
-  };
-
-  // Panes are looked through by paths alone, and paths of one segment see lamps alone.
-  const bool marches = !scene.view.thinGlass && (options.path.maxDepth < 0 || options.path.maxDepth >= 2);
-  const size_t all = numberOf(0, frame.height());
-  std::vector<PixelFeatures> features(all);
-  std::vector<DirectLight> direct(all);
-  forEachPixel(frame, stop, [&](int x, int y) {
-    LayerRadiance radiance;
-    if (!pixels.direct(x, y, features[numberOf(x, y)], radiance) || !marches)
-      radiance = paths.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
-    std::copy_n(radiance.value, kDirectLayers, direct[numberOf(x, y)].begin());
-  });
-  if (stop.stop_requested()) return false;
-  const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options.spacing);
-
-  const std::vector<Upsampling::Pixel>& computed = upsampling.computed();
-  std::vector<Upsampling::Light> light(computed.size());
-
-  const auto groups = (static_cast<int64_t>(computed.size()) + kGroup - 1) / kGroup;
-  parallelFor(groups, 1, [&](int64_t n) {
-    if (stop.stop_requested()) return;
-    const size_t first = static_cast<size_t>(n) * kGroup, count = std::min<size_t>(kGroup, computed.size() - first);
-    const auto found = pixels.indirect({&computed[first], count});
-    for (size_t i = 0; i < count; ++i) {
-      const Upsampling::Pixel p = computed[first + i];
-      light[first + i] = found[i] ? Upsampling::Light{found[i]->surface, found[i]->media}
-                                  : sampled(paths, p, idOf(p.x, p.y), options.samples);
-    }
-  });
-  forEachPixel(frame, stop, [&](int x, int y) {
-    LayerRadiance radiance;
-    std::copy_n(direct[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
-    const Upsampling::Light found = upsampling.at(light, x, y);
-    radiance.add(Layer::surfaceToSurface, found.surface[0]);
-    radiance.add(Layer::mediaToSurface, found.surface[1]);
-    radiance.add(Layer::surfaceToMedia, found.media[0]);
-    radiance.add(Layer::mediaToMedia, found.media[1]);
-    radiance += paths.sampleGlow(x, y, idOf(x, y));
-    frame.set(x, y, radiance);
-  });
-  return !stop.stop_requested();
+  return FramePass(scene, *lights_, own, seed, index).run(stop, frame);
 }
 
 }  // namespace virga

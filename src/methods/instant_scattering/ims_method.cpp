@@ -92,26 +92,19 @@ class ImsMethod final : public Method {
     });
     forEachPixel(frame, stop, [&](int x, int y) {
       LayerRadiance radiance = pixels.sample(x, y, of(id, x, y), ImsPixels::Part::direct);
-      const Upsampling::Light found = upsampling_->at(light, x, y);
-      for (size_t l = 0; l < 2; ++l) {
-        radiance.value[static_cast<int>(kOnSurface[l])] = found.surface[l];
-        radiance.value[static_cast<int>(kInMedia[l])] = found.media[l];
-      }
+      upsampling_->at(light, x, y).addTo(radiance);
       radiance += pixels.sampleGlow(x, y, of(id, x, y));
       frame.set(x, y, radiance);
     });
   }
+
   Upsampling::Light indirectLight(const ImsPixels& pixels, Upsampling::Pixel p, int samples, SampleId id) const {
     Upsampling::Light light;
     const float share = 1 / static_cast<float>(samples);
     for (int s = 0; s < samples; ++s) {
       SampleId own = of(id, p.x, p.y);
       own.index = own.index * static_cast<uint32_t>(samples) + static_cast<uint32_t>(s);
-      const LayerRadiance r = pixels.sample(p.x, p.y, own);
-      for (size_t l = 0; l < 2; ++l) {
-        light.surface[l] += r.value[static_cast<int>(kOnSurface[l])] * share;
-        light.media[l] += r.value[static_cast<int>(kInMedia[l])] * share;
-      }
+      light.add(pixels.sample(p.x, p.y, own), share);
     }
     return light;
   }
@@ -129,10 +122,6 @@ class ImsMethod final : public Method {
     }
     return overlay;
   }
-
-  /// The layers of Upsampling::Light.
-  static constexpr Layer kOnSurface[2] = {Layer::surfaceToSurface, Layer::mediaToSurface};
-  static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
 
   SceneSnapshot scene_;
   WalkStore walks_;                         ///< from frame to frame, if any are kept

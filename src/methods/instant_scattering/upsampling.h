@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "image/image.h"
+#include "image/layers.h"
 #include "methods/instant_scattering/pixel_features.h"
 
 namespace virga {
@@ -30,6 +31,18 @@ class Upsampling {
   /// x2 in a medium.
   struct Light {
     std::array<Rgb, 2> surface, media;
+
+    void add(const LayerRadiance& radiance, float share) {
+      for (size_t l = 0; l < 2; ++l) {
+        surface[l] += radiance.value[static_cast<int>(kOnSurface[l])] * share;
+        media[l] += radiance.value[static_cast<int>(kInMedia[l])] * share;
+      }
+    }
+    void addTo(LayerRadiance& radiance) const {
+      for (size_t l = 0; l < 2; ++l) radiance.add(kOnSurface[l], surface[l]), radiance.add(kInMedia[l], media[l]);
+    }
+    static constexpr Layer kOnSurface[2] = {Layer::surfaceToSurface, Layer::mediaToSurface};
+    static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
   };
   /// The light in pixel (x, y), from that of all computed pixels, in their order.
   Light at(const std::vector<Light>& computed, int x, int y) const;
