@@ -132,7 +132,9 @@ Wrong wrongPart(const Scene& scene, int points, int resolution, size_t ask = 0) 
   Pcg32 random(7);
   std::vector<LightVertex> lights;
   for (int i = 0; i < 60; ++i) lights.push_back(place(scene, rays, random));
-  const ShadowMaps maps(SurfacePoints(scene.view, points, 3), lights, {.resolution = resolution, .seed = 5});
+  const ShadowMapOptions options{.resolution = resolution, .seed = 5};
+  const ShadowMaps maps = points > 0 ? ShadowMaps(SurfacePoints(scene.view, points, 3), lights, options)
+                                     : ShadowMaps(*scene.surfaceRays, 1e-4f, lights, options);
   Wrong wrong;
   double all = 0;
   for (int i = 0; i < 60000; ++i) {
@@ -168,6 +170,16 @@ TEST(ShadowMaps, ErrorsFallWithPointsAndTexels) {
   EXPECT_LT(some, 0.7 * few);
   EXPECT_LT(many, 0.8 * some);
   EXPECT_LT(many, 0.7 * wrongPart(*scene, 8000, 32).all());
+}
+
+TEST(ShadowMaps, ARayForEachTexelIsBetterThanPoints) {
+  for (const std::string& shapes : {room(), sky()}) {
+    const SceneSnapshot scene = sceneWith(shapes);
+    const double coarse = wrongPart(*scene, 0, 32).all(), fine = wrongPart(*scene, 0, 128).all();
+    EXPECT_LT(coarse, 0.8 * wrongPart(*scene, 2000, 32).all());
+    EXPECT_LT(fine, 0.8 * wrongPart(*scene, 8000, 128).all());
+    EXPECT_LT(fine, 0.6 * coarse);
+  }
 }
 
 /// A light in a medium.

@@ -13,7 +13,7 @@ namespace {
 
 /// A light's place, a little off its surface.
 Vec3 aside(const FrameLights::Light& light, const SceneView& view) {
-  return light.vertex->p + light.vertex->normal * (1e-4f * view.scale);
+  return light.vertex->p + light.vertex->normal * mapOffset(view);
 }
 
 /// Of a node of the table, in the world.
@@ -213,10 +213,12 @@ float FrameLights::spacing() const {
 
 void FrameLights::makeMaps(const Scene& scene, const Options& options, const std::stop_token& stop) {
   refuseTooManyMaps(lights_.size(), options.resolution, "lights");
-  const SurfacePoints points(scene.view, options.points, 0);
   std::vector<LightVertex> vertices;
   for (const Light& l : lights_) vertices.push_back(*l.vertex);
-  const ShadowMaps maps(points, vertices, {.resolution = options.resolution}, stop);
+  const ShadowMapOptions map{.resolution = options.resolution};
+  const ShadowMaps maps = options.points > 0
+                              ? ShadowMaps(SurfacePoints(scene.view, options.points, 0), vertices, map, stop)
+                              : ShadowMaps(*scene.surfaceRays, mapOffset(scene.view), vertices, map, stop);
   mapSide_ = options.resolution;
   maps_.resize(lights_.size() * texelsOfMap());
   // In floats: no vector code gathers halves of words.

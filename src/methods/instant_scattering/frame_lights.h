@@ -16,8 +16,8 @@ class FrameLights {
   struct Options {
     int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
     ShadowMapping shadows = ShadowMapping::maps;
-    int resolution = 64;  ///< of a map, texels in either direction
-    int points = 500;     ///< of the surfaces, in each map
+    int resolution = 32;  ///< of a map, texels in either direction
+    int points = 0;       ///< of the surfaces, in each map; 0: a ray for each texel
     float turn = 0.5f;    ///< in [0, 1): which ones
   };
   struct Light {

@@ -44,7 +44,8 @@ class ImsMethod final : public Method {
     const VirtualLights lights = lightsOf(index, options, {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
     overlay_ = dotsOf(lights);
     const bool maps = options.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
-    if (maps && points_.cells() == 0) points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
+    if (maps && options.visibility.points > 0 && points_.cells() == 0)
+      points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
     const LightVisibility visibility(*scene_, lights, points_, options.visibility,
                                      hash64(hash64(seed_ + replicate) + sample), stop);
     const ImsPixels pixels(*scene_, lights, visibility.view(), options);

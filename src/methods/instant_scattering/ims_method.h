@@ -38,8 +38,9 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"visibility", "exact; frame: shadow_map",
      "of virtual lights: exact; minimum_depth: exact, without rays where nothing can be in the way (not in frames); "
      "shadow_map, none (biased)"},
-    {"map_resolution", "128; frame: 64", "shadow_map: of each light's map, texels in either direction"},
-    {"map_points", "8192; frame: 500", "shadow_map: points of the scene's surfaces in each light's map"},
+    {"map_resolution", "128; frame: 32", "shadow_map: of each light's map, texels in either direction"},
+    {"map_points", "8192; frame: 0",
+     "shadow_map: points of the scene's surfaces in each light's map; 0: a ray for each of its texels"},
     {"show", "picture", "picture; lost: only what clamping takes; compensation: only what is found again"},
     {"max_depth", "the scene's", "longest path in segments, -1 for no limit; 2 is direct light"},
     {"rr_depth", "the scene's", "scattering events of the eye path before Russian roulette by throughput begins"},

@@ -26,7 +26,7 @@ constexpr float kRadiusShare = 0.3f;
 /// Each leaves some lights of 64 bytes.
 constexpr int kMostWalks = 1 << 22;
 /// Of a frame, whose thousand lights share smaller maps' memory.
-constexpr int kFramePoints = 8, kFrameMapResolution = 64, kFrameMapPoints = 500;
+constexpr int kFramePoints = 8, kFrameMapResolution = 32, kFrameMapPoints = 0;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -53,7 +53,7 @@ void readVisibility(const SettingsReader& reader, ImsOptions::Mode mode, LightVi
   if (isFrame && o.mode == Seen::minimumDepth)
     throw Error("--set ims.visibility=minimum_depth needs ims.mode=exact or fast: a frame has shadow maps");
   o.resolution = reader.integer("map_resolution", 1).value_or(isFrame ? kFrameMapResolution : o.resolution);
-  o.points = reader.integer("map_points", 1).value_or(isFrame ? kFrameMapPoints : o.points);
+  o.points = reader.integer("map_points", 0).value_or(isFrame ? kFrameMapPoints : o.points);
   if (o.resolution > LightVisibilityOptions::kMostResolution)
     throw Error(fmt::format("--set ims.map_resolution may be at most {}", LightVisibilityOptions::kMostResolution));
   if (o.points > LightVisibilityOptions::kMostPoints)

@@ -23,7 +23,9 @@ LightVisibility::LightVisibility(const Scene& scene, const VirtualLights& lights
   if (mode_ == Mode::minimumDepth) minimumDepths_ = virga::minimumDepths(*scene.surfaceRays, lights.lights, stop);
   if (mode_ != Mode::shadowMap) return;
   refuseTooManyMaps(lights.lights.size(), options.resolution, "walks");
-  maps_ = ShadowMaps(points, lights.lights, {.resolution = options.resolution, .seed = seed}, stop);
+  const ShadowMapOptions map{.resolution = options.resolution, .seed = seed};
+  maps_ = options.points > 0 ? ShadowMaps(points, lights.lights, map, stop)
+                             : ShadowMaps(*scene.surfaceRays, mapOffset(scene.view), lights.lights, map, stop);
 }
 
 std::vector<float> minimumDepths(const RayScene& surfaces, std::span<const LightVertex> lights,

@@ -21,7 +21,7 @@ struct LightVisibilityOptions {
 
   Mode mode = Mode::exact;
   int resolution = 128;  ///< of shadow maps
-  int points = 8192;     ///< of the scene's surfaces in each
+  int points = 8192;     ///< of the scene's surfaces in each; 0: a ray for each texel
 };
 
 /// What is known around the point that virtual lights were gathered at; from there, new vertices are looked for.
@@ -74,6 +74,9 @@ struct LightVisibilityView {
     return d > 0 && maps.visible(known.light, way, d);
   }
 };
+
+/// From where maps without points are traced, beside a light's surface [unit].
+inline float mapOffset(const SceneView& scene) { return 1e-4f * scene.scale; }
 
 /// Throws Error where so many maps take too much memory. `fewer`: the setting that their number comes from.
 void refuseTooManyMaps(size_t lights, int resolution, std::string_view fewer);

@@ -112,13 +112,13 @@ class MapCanvas {
 /// Rounded to the upper half of its bits.
 uint16_t upperHalf(float depth) { return static_cast<uint16_t>((std::bit_cast<uint32_t>(depth) + 0x8000u) >> 16); }
 
-/// Could light meet a disk that lies there, as seen from it? Lambertian lights (those whose surface is not kept) shine
-/// to one side.
-bool mayBlock(const LightVertex& light, Vec3 center) {
-  const float d2 = lengthSquared(center);
+/// Could light meet what lies there, as seen from it? Lambertian lights (those whose surface is not kept) shine to one
+/// side.
+bool mayBlock(const LightVertex& light, Vec3 way) {
+  const float d2 = lengthSquared(way);
   if (!(d2 > 0)) return false;
   if (light.kind != VertexKind::surface) return true;
-  const float above = dot(center, light.normal) / std::sqrt(d2);
+  const float above = dot(way, light.normal) / std::sqrt(d2);
   return (light.surface < 0 ? above : std::fabs(above)) > kFlat;
 }
 
@@ -141,6 +141,27 @@ ShadowMaps::ShadowMaps(const SurfacePoints& points, std::span<const LightVertex>
     if (stop.stop_requested()) return;
     draw(points, lights[static_cast<size_t>(i)], static_cast<size_t>(i));
   });
+}
+
+ShadowMaps::ShadowMaps(const RayScene& surfaces, float offset, std::span<const LightVertex> lights,
+                       const ShadowMapOptions& options, const std::stop_token& stop)
+    : options_(options), directions_(options.resolution) {
+  depths_.resize(lights.size() * texels());
+  parallelFor(static_cast<int64_t>(lights.size()), 4, [&](int64_t i) {
+    if (!stop.stop_requested()) trace(surfaces, offset, lights[static_cast<size_t>(i)], static_cast<size_t>(i));
+  });
+}
+
+void ShadowMaps::trace(const RayScene& surfaces, float offset, const LightVertex& light, size_t index) {
+  for (size_t i = 0; i < texels(); ++i) {
+    const Vec3 w(directions_.x[i], directions_.y[i], directions_.z[i]);
+    float depth = kInfinity;
+    if (mayBlock(light, w)) {
+      const Vec3 o = light.p + light.normal * std::copysign(offset, dot(w, light.normal));  // 0 in a medium
+      if (const RayHit hit = surfaces.nearest({o, w}, 0, kInfinity); hit.found()) depth = hit.t;
+    }
+    depths_[index * texels() + i] = upperHalf(depth);
+  }
 }
 
 void ShadowMaps::draw(const SurfacePoints& points, const LightVertex& light, size_t index) {

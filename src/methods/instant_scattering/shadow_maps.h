@@ -9,6 +9,7 @@
 
 #include "core/octahedral.h"
 #include "methods/instant_scattering/surface_points.h"
+#include "rays/ray_scene.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -65,6 +66,11 @@ class ShadowMaps {
   ShadowMaps(const SurfacePoints& points, std::span<const LightVertex> lights, const ShadowMapOptions& options,
              const std::stop_token& stop = {});
 
+  /// Without points: each texel's depth is that of a ray through its middle, from `offset` [unit] beside a light's
+  /// surface.
+  ShadowMaps(const RayScene& surfaces, float offset, std::span<const LightVertex> lights,
+             const ShadowMapOptions& options, const std::stop_token& stop = {});
+
   ShadowMapsView view() const { return {depths_.data(), options_.resolution}; }
   size_t count() const { return depths_.size() / texels(); }
   /// [bytes]
@@ -76,6 +82,7 @@ class ShadowMaps {
   void draw(const SurfacePoints& points, const LightVertex& light, size_t index);
 
  private:
+  void trace(const RayScene& surfaces, float offset, const LightVertex& light, size_t index);
   size_t texels() const { return static_cast<size_t>(options_.resolution) * static_cast<size_t>(options_.resolution); }
 
   ShadowMapOptions options_;
