@@ -7,7 +7,7 @@ Seconds are those of the whole process, (user + system) / threads. relMSE = mean
 and channels against a converged picture b by Virga, of another seed, kept in out/bench. The reference's own relMSE, estimated from
 its replicates, is subtracted from what is measured: (a - b)^2 expects Var(a) + Var(b).
 
-A method that is biased (ims mode=fast) has no k: of it, what counts is the error after so many passes.
+A method that is biased (ims mode=fast or frame) has no k: of it, what counts is the error after so many passes.
 
 Each scene is rendered several times with different seeds; the median run is what counts. Writes out/bench/results.json.
 """
@@ -212,7 +212,7 @@ PAGE = """# Speed
 
 Written by `scripts/bench.sh --page docs/results/speed.md`, {threads} threads, {size} x {size} pixels, median over {runs} seed(s). k = seconds x relMSE is a constant of an
 unbiased renderer on a scene: lower is better, and k / relMSE is the time that it needs. Seconds are (user + system) / threads of the whole process;
-relMSE is against a converged picture of another seed, whose own error is subtracted. Only ratios within one table mean anything. `ims mode=fast` is biased: of it, the error
+relMSE is against a converged picture of another seed, whose own error is subtracted. Only ratios within one table mean anything. `ims` with mode=fast or frame is biased: of these, the error
 after so many passes counts, not k.
 
 | renderer | scene | samples a pixel | seconds | relMSE | bias | k |
