@@ -47,6 +47,11 @@ VIRGA_HD inline MediaRay leaveSurface(const SceneView& scene, const SurfacePoint
   return leaving;
 }
 
+/// Geometric normal on the side of w.
+VIRGA_HD inline Vec3 facing(const SurfacePoint& point, Vec3 w) {
+  return dot(point.geometricNormal, w) > 0 ? point.geometricNormal : -point.geometricNormal;
+}
+
 /// |cosine| of w to a surface; 1 in a medium, whose normal is 0.
 VIRGA_HD inline float generalCosine(Vec3 normal, Vec3 w) {
   return normal.x == 0 && normal.y == 0 && normal.z == 0 ? 1 : std::fabs(dot(normal, w));

@@ -52,13 +52,15 @@ struct EyePath {
   LastVertex last;
   LayerPath layers;
   LayerRadiance radiance;
-  Record* record = nullptr;  ///< where to write down vertices that virtual lights can light; null: nowhere
-  float bound = 0;           ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
+  LayerRadiance* met = nullptr;  ///< where light of lamps that the path meets goes instead, if anywhere
+  Record* record = nullptr;      ///< where to write down vertices that virtual lights can light; null: nowhere
+  float bound = 0;               ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
   Link link;
   LampGuide lamp;                 ///< of the last vertex, for technique B on the next segment
   float promise = 1, before = 1;  ///< LampGuide::promise of the last direction and of the one before
 
   VIRGA_HD void add(const LayerPath& where, Rgb light) { radiance.add(where.layer(), throughput * light); }
+  VIRGA_HD void addMet(Rgb light) { (met ? *met : radiance).add(layers.layer(), throughput * light); }
 
   /// Bounces for which low-discrepancy numbers are spent; later ones take independent ones.
   static constexpr int kStratifiedBounces = 4;

@@ -16,6 +16,7 @@ class PathMethod final : public Method {
     maxDepth_ = reader.integer("max_depth", -1);
     rrDepth_ = reader.integer("rr_depth", 1);
     equiangularDepth_ = reader.integer("equiangular_depth", 0);
+    sharedPaths_ = reader.boolean("shared_paths").value_or(true);
     seed_ = settings.seed;
   }
 
@@ -28,13 +29,22 @@ class PathMethod final : public Method {
     const PathOptions options = optionsForScene();
     return {{"max_depth", std::to_string(options.maxDepth)},
             {"rr_depth", std::to_string(options.rrDepth)},
-            {"equiangular_depth", std::to_string(options.equiangularDepth)}};
+            {"equiangular_depth", std::to_string(options.equiangularDepth)},
+            {"shared_paths", sharesPaths() ? "true" : "false"}};
   }
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const PathPixels pixels(*scene_, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
+    const SampleId id{seed_, replicate, 0, sample};
+    if (sharesPaths()) {
+      const PixelGroups groups(frame.width(), frame.height(), hash64(seed_) + static_cast<uint64_t>(index));
+      forEachGroup(groups, stop, [&](std::span<const PixelAt> group) {
+        pixels.sampleGroup(group, id, [&](PixelAt at, const LayerRadiance& r) { frame.set(at.x, at.y, r); });
+      });
+      return {.completed = !stop.stop_requested()};
+    }
     forEachPixel(frame, stop, [&](int x, int y) {
       frame.set(x, y, pixels.sample(x, y, {seed_, replicate, scene_->camera.pixelStream(x, y), sample}));
     });
@@ -47,8 +57,12 @@ class PathMethod final : public Method {
             .rrDepth = rrDepth_.value_or(scene_->integrator.rrDepth),
             .equiangularDepth = equiangularDepth_.value_or(PathOptions{}.equiangularDepth)};
   }
+  bool sharesPaths() const {
+    return sharedPaths_ && SharedPaths<EmbreeRays>::possible(scene_->view, optionsForScene());
+  }
 
   SceneSnapshot scene_;
+  bool sharedPaths_ = true;
   std::optional<int> maxDepth_, rrDepth_, equiangularDepth_;
   uint64_t seed_ = 0;
 };

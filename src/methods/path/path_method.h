@@ -11,6 +11,9 @@ inline constexpr SettingInfo kPathSettings[] = {
     {"equiangular_depth", "1",
      "segments on which equiangular sampling in homogeneous media aims at all lights, not at small and near ones "
      "alone"},
+    {"shared_paths", "true",
+     "where one homogeneous medium fills all space, 16 pixels at a time share paths (docs/decisions/shared-paths.md); "
+     "false: the pixels' errors are independent"},
 };
 
 /// Unidirectional volumetric path tracing: the reference that every other method is held against.

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "methods/path/path_tracer.h"
-#include "methods/pixels.h"
+#include "methods/path/pixel_groups.h"
+#include "methods/path/shared_paths.h"
 #include "scene/scene.h"
 
 namespace virga {
 
-/// Samples of single pixels by path tracing, each on its own: for a whole picture, or for a few pixels of one. The
-/// scene must outlive it.
+/// Samples of pixels by path tracing: of single ones, each on its own, or of groups that share paths. The scene must
+/// outlive it.
 class PathPixels {
  public:
   PathPixels(const Scene& scene, const PathOptions& options)
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         options_(options),
-        tracer_(scene_.view, rays_, options_) {}
+        tracer_(scene_.view, rays_, options_),
+        shared_(scene_.view, rays_, tracer_) {}
   PathPixels(const PathPixels&) = delete;
   PathPixels& operator=(const PathPixels&) = delete;
 
@@ -26,11 +27,31 @@ class PathPixels {
     return tracer_.trace(sampleCameraRay(scene_, x, y, sampler), sampler);
   }
 
+  /// set(pixel, radiance) for each of a group's pixels, whose paths are shared: only where SharedPaths::possible().
+  /// The stream of `id` is of no concern: each pixel has its own.
+  template <class Set>
+  void sampleGroup(std::span<const PixelAt> pixels, SampleId id, const Set& set) const {
+    std::array<CameraRay, PixelGroups::kMostPixels> cameras;
+    std::array<LayerRadiance, PixelGroups::kMostPixels> radiance;
+    std::vector<Sampler> samplers;
+    samplers.reserve(pixels.size());
+    for (size_t i = 0; i < pixels.size(); ++i) {
+      id.stream = scene_.camera.pixelStream(pixels[i].x, pixels[i].y);
+      samplers.emplace_back(id);
+      cameras[i] = sampleCameraRay(scene_, pixels[i].x, pixels[i].y, samplers[i]);
+    }
+    shared_.trace(cameras.data(), samplers.data(), static_cast<int>(pixels.size()), radiance.data());
+    for (size_t i = 0; i < pixels.size(); ++i) set(pixels[i], radiance[i]);
+  }
+
  private:
+  static_assert(PixelGroups::kMostPixels <= SharedPaths<EmbreeRays>::kMost);
+
   const Scene& scene_;
   EmbreeRays rays_;
   PathOptions options_;
-  PathTracer<EmbreeRays> tracer_;  ///< refers to the members above
+  PathTracer<EmbreeRays> tracer_;   ///< refers to the members above
+  SharedPaths<EmbreeRays> shared_;  ///< likewise
 };
 
 }  // namespace virga

@@ -129,8 +129,7 @@ class PathTracer {
     const EmitterView& emitter = scene_.emitters[scene_.environment];
     const Vec3 w = path.at.ray.d;
     const float connection = scene_.emitterChoice.probability(scene_.environment) * environmentPdf(emitter, w);
-    path.add(path.layers,
-             environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
+    path.addMet(environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
   }
 
   VIRGA_HD void addAreaLight(Path& path, const SurfacePoint& point, const RayHit& hit) const {
@@ -151,7 +150,7 @@ class PathTracer {
         w = weight(last.pdf, connection);
       }
     }
-    path.add(path.layers, emitter.radianceAt(lightUv(shape, emitter, point.p, hit.primitive, {hit.u, hit.v})) * w);
+    path.addMet(emitter.radianceAt(lightUv(shape, emitter, point.p, hit.primitive, {hit.u, hit.v})) * w);
   }
 
   // --- next-event estimation ---
@@ -362,7 +361,7 @@ class PathTracer {
     path.promise = 1;
     if (path.lamp.hasAxis()) path.lamp.guide(side.bsdf->pdf(side.wo, side.frame.toLocal(path.lamp.axis)), 1 / kTwoPi);
     if (!(path.lamp.share > 0)) return side.bsdf->sample(side.wo, path.pair(sampler), path.one(sampler));
-    const Vec3 n = dot(point.geometricNormal, path.at.ray.d) < 0 ? point.geometricNormal : -point.geometricNormal;
+    const Vec3 n = facing(point, -path.at.ray.d);
     BsdfSample s;
     if (path.one(sampler) < path.lamp.share) {
       s.wi = side.frame.toLocal(path.lamp.sample(n, path.pair(sampler)));
