@@ -80,7 +80,8 @@ void buildRectangle(BuildContext&, PluginReader& reader, Role role, BuiltShape& 
   finishMesh(shape, role);
   const std::vector<Vec3>& p = shape.mesh.positions;
   const bool mirrored = toWorld.determinant3() < 0;  // the normal is along edgeX x edgeY
-  RectangleView r{p[0], p[mirrored ? 3 : 1] - p[0], p[mirrored ? 1 : 3] - p[0]};
+  RectangleView r{p[0], p[mirrored ? 3 : 1] - p[0], p[mirrored ? 1 : 3] - p[0], {}};
+  r.normal = normalize(cross(r.edgeX, r.edgeY));
   if (mirrored) std::swap(r.uvX, r.uvY);
   const bool sheared = std::fabs(dot(r.edgeX, r.edgeY)) > 1e-5f * length(r.edgeX) * length(r.edgeY);
   if (!sheared) shape.rectangle = r;

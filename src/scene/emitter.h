@@ -140,6 +140,11 @@ VIRGA_HD inline Vec2 lightUv(const ShapeView& shape, const EmitterView& emitter,
 }
 
 VIRGA_HD inline LightPoint uniformPointOnShape(const ShapeView& shape, const EmitterView& emitter, Vec2 u) {
+  if (emitter.isRectangle) {
+    const RectangleView& r = emitter.rectangle;
+    const Vec3 p = r.corner + r.edgeX * u.x + r.edgeY * u.y;
+    return {p, r.normal * shape.orientation, 1 / emitter.area, false, r.uvX * u.x + r.uvY * u.y};
+  }
   const ShapePoint s = uniformPointOnShape(shape, u);
   return {s.p, s.normal, 1 / emitter.area, false, lightUv(shape, emitter, s.p, s.primitive, s.barycentric)};
 }
@@ -194,8 +199,7 @@ VIRGA_HD inline LightSample towardPoint(const EmitterView& emitter, Vec3 x, cons
 VIRGA_HD inline LightSample sampleRectangleLight(const ShapeView& shape, const EmitterView& emitter, Vec3 x, Vec2 u) {
   const SphericalRectangle seen(emitter.rectangle, x);
   if (!seen.usable()) return towardPoint(emitter, x, uniformPointOnShape(shape, emitter, u));
-  const Vec3 normal = normalize(cross(emitter.rectangle.edgeX, emitter.rectangle.edgeY)) * shape.orientation;
-  const Vec3 on = seen.sample(u);
+  const Vec3 on = seen.sample(u), normal = emitter.rectangle.normal * shape.orientation;
   LightSample s = towardPoint(emitter, x, {on, normal, 1 / emitter.area, false, emitter.rectangle.uvAt(on)});
   if (s.pdf > 0) s.pdf = 1 / seen.solidAngle();
   return s;

@@ -8,6 +8,7 @@ namespace virga {
 /// corner + a edgeX + b edgeY for a, b in [0, 1]; the edges are at a right angle.
 struct RectangleView {
   Vec3 corner, edgeX, edgeY;
+  Vec3 normal;                ///< unit: of edgeX x edgeY
   Vec2 uvX{1, 0}, uvY{0, 1};  ///< what the edges add to the texture coordinates
 
   VIRGA_HD Vec2 uvAt(Vec3 p) const {
