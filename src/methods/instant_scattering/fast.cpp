@@ -63,7 +63,7 @@ class FastPass {
     for (int s = 0; s < samples_; ++s) {
       SampleId own = of(p.x, p.y);
       own.index = own.index * static_cast<uint32_t>(samples_) + static_cast<uint32_t>(s);
-      light.add(pixels_.sample(p.x, p.y, own), share);
+      light.add(pixels_.sample(p.x, p.y, own, ImsPixels::Part::indirect), share);
     }
     return light;
   }
@@ -106,9 +106,9 @@ View<LampTable> FastRenderer::lampTables(const Scene& scene, const ImsOptions& o
 void FastRenderer::pass(const Scene& scene, const ImsPixels& pixels, const ImsOptions& options, const SampleId& id,
                         const std::stop_token& stop, PassFrame& frame) {
   FastPass own(scene, pixels, options, id, stop, frame);
-  const bool first = id.replicate == 0 && id.index == 0;
-  if (first || !upsampling_) {
-    std::vector<PixelFeatures> features = first ? own.lookAndLight() : own.look();
+  const bool lights = id.replicate == 0 && id.index == 0 && pixels.marches();
+  if (lights || !upsampling_) {
+    std::vector<PixelFeatures> features = lights ? own.lookAndLight() : own.look();
     if (stop.stop_requested()) return;
     upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
   }

@@ -18,7 +18,8 @@ class FastRenderer {
   /// What the lamps' light is looked up in, made when it is asked for. A stop may leave it unfinished.
   View<LampTable> lampTables(const Scene& scene, const ImsOptions& options, const std::stop_token& stop);
 
-  /// Fills `frame`. Pass 0 looks at the pixels' middles, for what they show and for their light at once.
+  /// Fills `frame`. Where light is marched pass 0 looks at the pixels' middles, for what they show and for their light
+  /// at once.
   void pass(const Scene& scene, const ImsPixels& pixels, const ImsOptions& options, const SampleId& id,
             const std::stop_token& stop, PassFrame& frame);
 

@@ -14,8 +14,9 @@ namespace virga {
 /// The scene, the lights and the tables must outlive it.
 class ImsPixels {
  public:
-  /// The light of lamps in all layers, or without those that virtual lights light: x1 alone.
-  enum class Part { all, direct };
+  /// The light of lamps in all layers; without those that virtual lights light: x1 alone; in these alone, the others
+  /// are not to be used.
+  enum class Part { all, direct, indirect };
 
   ImsPixels(const Scene& scene, const VirtualLights& lights, const LightVisibilityView& visibility,
             const ImsOptions& options, View<LampTable> lampTables = {})
@@ -52,8 +53,9 @@ class ImsPixels {
     Tracer::Record record;
     path.record = &record;
     // The path finds what clamping takes, or nothing of what virtual lights could light.
-    const bool compensates = part == Part::all && options_.compensate == ImsOptions::Compensate::path &&
+    const bool compensates = part != Part::direct && options_.compensate == ImsOptions::Compensate::path &&
                              options_.show == ImsOptions::Show::picture;
+    path.lightsX1 = part != Part::indirect;
     path.bound = compensates ? options_.gather.bound : kInfinity;
     for (bool goesOn = true; goesOn;) {
       record.vertex.kind = VertexKind::none;
@@ -68,14 +70,16 @@ class ImsPixels {
     }
     return path.radiance;
   }
+  /// Is the light of x1 alone found by marching?
+  bool marches() const { return marches_; }
   /// What pixel (x, y) shows, by the ray through its middle.
   PixelFeatures features(int x, int y) const { return pixelFeatures(scene_, x, y, options_.eyeSteps); }
-  /// Likewise, and the light of x1 alone, by the same ray where it is found by marching.
+  /// Likewise, and the light of x1 alone, by the same ray unless it sees a mirror or glass. Only where marches().
   LayerRadiance sampleMiddle(int x, int y, const SampleId& id, PixelFeatures& features) const {
     MarchedEye eye;
     marchMiddle(scene_, x, y, options_.eyeSteps, eye);
     features = pixelFeatures(eye);
-    if (!marches_ || !eye.plain) return sample(x, y, id, Part::direct);
+    if (!eye.plain) return sample(x, y, id, Part::direct);
     LayerRadiance radiance;
     Sampler sampler(id);
     RandomNumbers numbers{sampler};
