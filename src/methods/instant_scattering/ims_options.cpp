@@ -179,7 +179,11 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
     amount->lights = isFrame ? lights : lights_.value_or(lights);
   if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
-  o.lampTable = lampTable_.value_or(lampTableSide(scene.view));
+  const int tableSide = lampTableSide(scene.view);  // 0: marched light is all that there can be
+  o.lampTable = tableSide == 0 ? 0 : lampTable_.value_or(tableSide);
+  if (lampTableBytes(scene.view, o.lampTable) > LampTables::kMostBytes)
+    throw Error(fmt::format("--set ims.lamp_table={}: the tables would take more than 1 GB", o.lampTable),
+                {{}, "choose fewer nodes, or 0 for none", {}});
   o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
   const float extent = extentOf(scene.view);
   o.compensation.radius = radius_.value_or(kRadiusShare * extent);

@@ -44,9 +44,16 @@ bool isPointLike(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::spot;
 }
 
+int lampsOf(const SceneView& scene) {
+  return static_cast<int>(std::count_if(scene.emitters.begin(), scene.emitters.end(), isPointLike));
+}
+int channelsOf(const SceneView& scene) { return scene.chromatic ? 3 : 1; }
+
+int radiiOf(int side) { return std::max(2, side / 2); }
+
 LampTable tableFor(const Bounds& media, Vec3 p, int side, int channels) {
   LampTable table;
-  table.side = side, table.radii = std::max(2, side / 2), table.channels = channels, table.p = p;
+  table.side = side, table.radii = radiiOf(side), table.channels = channels, table.p = p;
   const Vec3 way = media.center() - p;
   const float d = length(way), radius = 0.5f * length(media.extent());
   table.last = d + radius;
@@ -78,7 +85,7 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
     ++m;
   };
   walkMedia(scene.view, rays, r, table.last, [&](float t0, float t1) {
-    return marchMedia(scene.view, r.media, r.ray, t0, t1, table.side, 0, [&](float a, float b, Rgb own) {
+    return marchMedia(scene.view, r.media, r.ray, t0, t1, table.radii, 0, [&](float a, float b, Rgb own) {
       while (m < table.radii && table.radius(m) < b) set(sum + own * (std::max(0.f, table.radius(m) - a) / (b - a)));
       sum += own;
       return true;
@@ -91,12 +98,11 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
 
 LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop) {
   const SceneView& view = scene.view;
-  const auto lamps = std::count_if(view.emitters.begin(), view.emitters.end(), isPointLike);
-  if (lamps == 0 || lamps > kMostLamps || !std::all_of(view.media.begin(), view.media.end(), isBounded)) return;
+  if (lampTableSide(view) == 0) return;
   Bounds bounds;
   for (const MediumView& medium : view.media) extendByGrid(medium, bounds);
   if (bounds.empty()) return;
-  const int endless = endlessMedium(scene), channels = view.chromatic ? 3 : 1;
+  const int endless = endlessMedium(scene), channels = channelsOf(view);
   for (const EmitterView& emitter : view.emitters) {
     tables_.emplace_back();
     if (!isPointLike(emitter)) continue;
@@ -114,10 +120,18 @@ LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop
 
 int lampTableSide(const SceneView& scene) {
   constexpr int kFew = 32, kMany = 256;
+  const int lamps = lampsOf(scene);
+  const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), isBounded);
+  if (lamps == 0 || lamps > LampTables::kMostLamps || scene.media.size == 0 || !bounded) return 0;
   float voxels = 0;
   for (const MediumView& medium : scene.media)
-    if (isBounded(medium)) voxels = std::max(voxels, maxComponent(medium.density.supportHi - medium.density.supportLo));
+    voxels = std::max(voxels, maxComponent(medium.density.supportHi - medium.density.supportLo));
   return static_cast<int>(clamp(1.5f * voxels, kFew, kMany));
+}
+
+size_t lampTableBytes(const SceneView& scene, int side) {
+  return static_cast<size_t>(lampsOf(scene) * channelsOf(scene)) * static_cast<size_t>(side * side) *
+         static_cast<size_t>(radiiOf(side)) * sizeof(float);
 }
 
 }  // namespace virga

@@ -10,7 +10,7 @@
 namespace virga {
 
 /// Optical depths of the media between a point-like lamp and places around it, at nodes of a square of directions and
-/// of distances: a deep shadow map (Lokovic and Veach 2000) of media alone. Plain data.
+/// of distances, linear between them: a deep shadow map (Lokovic and Veach 2000) of media alone. Plain data.
 struct LampTable {
   const float* depth = nullptr;  ///< [channel][row][column][radius]; null: there is no table
   int side = 0, radii = 0;       ///< nodes along the square's edge, the outer ones on it, and along each direction
@@ -30,23 +30,22 @@ struct LampTable {
     return first + (last - first) * (static_cast<float>(m) / static_cast<float>(radii - 1));
   }
 
-  /// Transmittance between the lamp and x. Between directions it is the transmittance that is linear: so shadows are
-  /// blurred by what lies between two nodes, and in the mean they are right.
-  VIRGA_HD Rgb transmittanceTo(Vec3 x) const {
+  /// Optical depth between the lamp and x.
+  VIRGA_HD Rgb depthTo(Vec3 x) const {
     const Vec3 way = frame.toLocal(x - p);
     const float d = length(way);
-    if (!(d > first)) return Rgb(1.f);
+    if (!(d > first)) return {};
     Vec2 q;
     if (reach > 0) {
       const float most = reach * way.z;
-      if (!(std::fabs(way.x) < most && std::fabs(way.y) < most)) return Rgb(1.f);
+      if (!(std::fabs(way.x) < most && std::fabs(way.y) < most)) return {};
       q = {way.x / most, way.y / most};
     } else {
       q = toOctahedron(way);
     }
     const float m = (d - first) / (last - first);
     const Nodes column(0.5f * (q.x + 1), side), row(0.5f * (q.y + 1), side), radial(std::fmin(m, 1.f), radii);
-    const auto along = [&](const float* at) { return std::exp(-lerp(at[0], at[1], radial.share)); };
+    const auto along = [&](const float* at) { return lerp(at[0], at[1], radial.share); };
     Rgb found;
     for (int c = 0; c < channels; ++c) {
       const float* at = depth + offset(c, row.index, column.index) + radial.index;
@@ -82,6 +81,7 @@ class LampTables {
  public:
   static constexpr int kMostLamps = 8;  ///< where there are more, marching costs less than filling their tables
   static constexpr int kLeastSide = 2, kMostSide = 512;
+  static constexpr size_t kMostBytes = size_t{1} << 30;
 
   LampTables() = default;
   /// `side`: nodes of each table in either direction, and half as many radii. A stop leaves zeros.
@@ -95,7 +95,10 @@ class LampTables {
   std::vector<std::vector<float>> depths_;
 };
 
-/// Nodes in either direction that do justice to the scene's grids: one and a half for each voxel of the largest.
+/// Nodes in either direction that do justice to the scene's grids: one and a half for each voxel of the largest, but at
+/// least 32 and at most 256. 0 where there can be no tables.
 int lampTableSide(const SceneView& scene);
+/// What tables of that side take [bytes].
+size_t lampTableBytes(const SceneView& scene, int side);
 
 }  // namespace virga

@@ -201,7 +201,7 @@ class MarchedLight {
     if (!std::isinf(light.distance)) ray = aimAt(scene_, r, x + light.wi * light.distance);
     if (!(ray.tMax > 0)) return Rgb(1.f);
     if (rays_.occluded(ray.at.ray, ray.tMax)) return {};
-    if (lamp < tables_.size && lamp >= 0 && tables_[lamp].present()) return tables_[lamp].transmittanceTo(x);
+    if (lamp < tables_.size && lamp >= 0 && tables_[lamp].present()) return transmittanceOf(tables_[lamp].depthTo(x));
     return marchedTransmittance(scene_, rays_, ray.at, ray.tMax, kLightSteps, numbers.shift());
   }
 
