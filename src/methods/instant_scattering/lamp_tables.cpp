@@ -80,13 +80,17 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
   MediaRay r{{table.p, table.direction({place(column), place(row)})}, media, 0};
   Rgb sum;
   int m = 0;
+  float radius = table.radius(0);  // number m
+  float* nodes = depth + table.offset(0, row, column);
+  const size_t channelSize = table.offset(1, 0, 0);
   const auto set = [&](Rgb value) {
-    for (int c = 0; c < table.channels; ++c) depth[table.offset(c, row, column) + static_cast<size_t>(m)] = value[c];
-    ++m;
+    for (int c = 0; c < table.channels; ++c)
+      nodes[channelSize * static_cast<size_t>(c) + static_cast<size_t>(m)] = value[c];
+    radius = table.radius(++m);
   };
   walkMedia(scene.view, rays, r, table.last, [&](float t0, float t1) {
     return marchMedia(scene.view, r.media, r.ray, t0, t1, table.radii, 0, [&](float a, float b, Rgb own) {
-      while (m < table.radii && table.radius(m) < b) set(sum + own * (std::max(0.f, table.radius(m) - a) / (b - a)));
+      while (m < table.radii && radius < b) set(sum + own * (std::max(0.f, radius - a) / (b - a)));
       sum += own;
       return true;
     });
