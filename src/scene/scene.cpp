@@ -58,6 +58,10 @@ Aspect aspectOfPresence(std::string_view tag) { return tag == "emitter" ? Aspect
 
 }  // namespace
 
+bool ChangeSet::cameraAlone() const {
+  return std::all_of(changes.begin(), changes.end(), [](const Change& c) { return c.aspect == Aspect::camera; });
+}
+
 bool ChangeSet::touches(Aspect aspect) const {
   return std::any_of(changes.begin(), changes.end(), [&](const Change& c) { return c.aspect == aspect; });
 }

@@ -65,6 +65,7 @@ struct ChangeSet {
 
   bool empty() const { return changes.empty(); }
   bool touches(Aspect) const;
+  bool cameraAlone() const;  ///< nothing but the camera has changed, if anything has
 };
 
 /// By the ids of the objects in both descriptions.

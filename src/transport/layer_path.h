@@ -19,6 +19,7 @@ class LayerPath {
       x2_ = v;
     }
   }
+  VIRGA_HD bool hasX1() const { return x1_ != VertexKind::none; }
   VIRGA_HD bool hasX2() const { return x2_ != VertexKind::none; }
   VIRGA_HD void scatterSpecularly() { specular_ = true; }
 

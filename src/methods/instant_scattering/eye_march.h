@@ -134,10 +134,10 @@ struct MarchedEye {
   }
 };
 
-/// Fills `eye`, steps shifted by `shift`.
+/// Fills `eye`, steps shifted by `shift`; at most MarchedEye::kSteps of them.
 template <class Rays>
-VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
-                       MarchedEye& eye) {
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift, MarchedEye& eye,
+                       int steps = MarchedEye::kSteps) {
   eye.at = leaveCamera(scene, camera.ray);
   eye.hit = rays.nearest(eye.at.ray, camera.tMax);
   if (eye.hit.found()) {
@@ -150,7 +150,7 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
     const bool kept = eye.stretches < MarchedEye::kMostStretches;
     eye.plain &= kept;
     if (kept) eye.media[eye.stretches] = eye.at.media;
-    marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, MarchedEye::kSteps, shift, [&](float a, float b, Rgb here) {
+    marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, steps, shift, [&](float a, float b, Rgb here) {
       if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))
         eye.step[eye.steps++] = {
             a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};

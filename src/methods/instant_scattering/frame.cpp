@@ -112,10 +112,7 @@ class FramePass {
 }  // namespace
 
 void FrameRenderer::forget(const ChangeSet& changes) {
-  const std::vector<Change>& all = changes.changes;
-  const bool cameraAlone =
-      std::all_of(all.begin(), all.end(), [](const Change& change) { return change.aspect == Aspect::camera; });
-  if (!cameraAlone) lights_ = nullptr;
+  if (!changes.cameraAlone()) lights_ = nullptr;
 }
 
 bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,

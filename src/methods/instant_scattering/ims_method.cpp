@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/ims_method.h"
 
+#include "methods/instant_scattering/fast.h"
 #include "methods/instant_scattering/frame.h"
 #include "transport/kept_walks.h"
 
@@ -20,9 +21,9 @@ class ImsMethod final : public Method {
     settings_.forScene(*next);
     walks_.edit(*scene_, *next, changes);
     scene_ = std::move(next);
-    upsampling_ = nullptr;
     points_ = {};
-    renderer_.forget(changes);
+    fast_.forget(changes);
+    frame_.forget(changes);
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -35,8 +36,8 @@ class ImsMethod final : public Method {
     const ImsOptions options = settings_.forScene(*scene_);
     if (options.mode == ImsOptions::Mode::frame) {
       const bool completed =
-          renderer_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
-      if (renderer_.lights()) overlay_ = dotsOf(renderer_.lights()->virtualLights());
+          frame_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
+      if (frame_.lights()) overlay_ = dotsOf(frame_.lights()->virtualLights());
       return {.completed = completed, .biased = true};
     }
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
@@ -48,12 +49,14 @@ class ImsMethod final : public Method {
       points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
     const LightVisibility visibility(*scene_, lights, points_, options.visibility,
                                      hash64(hash64(seed_ + replicate) + sample), stop);
-    const ImsPixels pixels(*scene_, lights, visibility.view(), options);
+    const bool fast = options.mode == ImsOptions::Mode::fast;
+    const ImsPixels pixels(*scene_, lights, visibility.view(), options,
+                           fast ? fast_.lampTables(*scene_, options, stop) : View<LampTable>{});
     const SampleId id{seed_, replicate, 0, sample};
-    if (options.mode == ImsOptions::Mode::exact)
-      exactPass(pixels, id, stop, frame);
+    if (fast)
+      fast_.pass(*scene_, pixels, options, id, stop, frame);
     else
-      fastPass(pixels, options, id, stop, frame);
+      exactPass(pixels, id, stop, frame);
     return {.completed = !stop.stop_requested(), .biased = options.biased()};
   }
 
@@ -76,40 +79,6 @@ class ImsMethod final : public Method {
     });
   }
 
-  /// Light of x1 alone in each pixel; what else there is, at the coarse pixels, and from them everywhere.
-  void fastPass(const ImsPixels& pixels, const ImsOptions& options, SampleId id, std::stop_token stop,
-                PassFrame& frame) {
-    if (!upsampling_) {
-      std::vector<PixelFeatures> features = pictureFeatures(*scene_, stop);
-      if (stop.stop_requested()) return;
-      upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
-    }
-    const std::vector<Upsampling::Pixel>& computed = upsampling_->computed();
-    std::vector<Upsampling::Light> light(computed.size());
-    parallelFor(static_cast<int64_t>(computed.size()), 4, [&](int64_t i) {
-      if (stop.stop_requested()) return;
-      const auto n = static_cast<size_t>(i);
-      light[n] = indirectLight(pixels, computed[n], options.samples, id);
-    });
-    forEachPixel(frame, stop, [&](int x, int y) {
-      LayerRadiance radiance = pixels.sample(x, y, of(id, x, y), ImsPixels::Part::direct);
-      upsampling_->at(light, x, y).addTo(radiance);
-      radiance += pixels.sampleGlow(x, y, of(id, x, y));
-      frame.set(x, y, radiance);
-    });
-  }
-
-  Upsampling::Light indirectLight(const ImsPixels& pixels, Upsampling::Pixel p, int samples, SampleId id) const {
-    Upsampling::Light light;
-    const float share = 1 / static_cast<float>(samples);
-    for (int s = 0; s < samples; ++s) {
-      SampleId own = of(id, p.x, p.y);
-      own.index = own.index * static_cast<uint32_t>(samples) + static_cast<uint32_t>(s);
-      light.add(pixels.sample(p.x, p.y, own), share);
-    }
-    return light;
-  }
-
   SampleId of(SampleId id, int x, int y) const {
     id.stream = scene_->camera.pixelStream(x, y);
     return id;
@@ -125,10 +94,10 @@ class ImsMethod final : public Method {
   }
 
   SceneSnapshot scene_;
-  WalkStore walks_;                         ///< from frame to frame, if any are kept
-  std::unique_ptr<Upsampling> upsampling_;  ///< of this scene; made when it is needed
-  SurfacePoints points_;                    ///< likewise
-  FrameRenderer renderer_;                  ///< likewise, for frames
+  WalkStore walks_;       ///< from frame to frame, if any are kept
+  SurfacePoints points_;  ///< of this scene; made when they are needed
+  FastRenderer fast_;     ///< likewise
+  FrameRenderer frame_;   ///< likewise
   Overlay overlay_;
   ImsSettings settings_;
   uint64_t seed_ = 0;

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 
+#include "methods/instant_scattering/eye_march.h"
 #include "methods/instant_scattering/ims_method.h"
+#include "methods/instant_scattering/lamp_tables.h"
 #include "methods/settings_reader.h"
 
 namespace virga {
@@ -97,6 +99,7 @@ void refuseIdle(const Settings& settings, const ImsOptions& o) {
   refuseIdle(settings, o.visibility.mode != LightVisibilityOptions::Mode::shadowMap, {"map_resolution", "map_points"},
              "ims.visibility=shadow_map");
   refuseIdle(settings, o.mode == ImsOptions::Mode::exact, {"samples", "spacing"}, "ims.mode=fast or frame");
+  refuseIdle(settings, o.mode != ImsOptions::Mode::fast, {"eye_steps", "lamp_table"}, "ims.mode=fast");
   refuseIdle(settings, o.mode == ImsOptions::Mode::frame, {"paths"}, "ims.mode=exact or fast");
 }
 
@@ -107,6 +110,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
   ImsOptions& o = given_;
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
+  readMarching(reader);
   walks_ = reader.integer("walks", 1);
   if (walks_ && *walks_ > kMostWalks)
     throw Error(fmt::format("--set ims.walks may be at most {}", kMostWalks),
@@ -151,6 +155,17 @@ ImsSettings::ImsSettings(const Settings& settings) {
   refuseIdle(settings, o);
 }
 
+void ImsSettings::readMarching(const SettingsReader& reader) {
+  given_.eyeSteps = reader.integer("eye_steps", 1).value_or(given_.eyeSteps);
+  if (given_.eyeSteps > MarchedEye::kSteps)
+    throw Error(fmt::format("--set ims.eye_steps may be at most {}", MarchedEye::kSteps));
+  lampTable_ = reader.integer("lamp_table", 0);
+  if (!lampTable_ || *lampTable_ == 0) return;
+  if (*lampTable_ < LampTables::kLeastSide || *lampTable_ > LampTables::kMostSide)
+    throw Error(fmt::format("--set ims.lamp_table may be {} to {}, or 0 for none", LampTables::kLeastSide,
+                            LampTables::kMostSide));
+}
+
 ImsOptions ImsSettings::forScene(const Scene& scene) const {
   ImsOptions o = given_;
   o.path.maxDepth = o.gather.maxDepth = maxDepth_.value_or(scene.integrator.maxDepth);
@@ -164,6 +179,11 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
     amount->lights = isFrame ? lights : lights_.value_or(lights);
   if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
+  const int tableSide = lampTableSide(scene.view);  // 0: marched light is all that there can be
+  o.lampTable = tableSide == 0 ? 0 : lampTable_.value_or(tableSide);
+  if (lampTableBytes(scene.view, o.lampTable) > LampTables::kMostBytes)
+    throw Error(fmt::format("--set ims.lamp_table={}: the tables would take more than 1 GB", o.lampTable),
+                {{}, "choose fewer nodes, or 0 for none", {}});
   o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
   const float extent = extentOf(scene.view);
   o.compensation.radius = radius_.value_or(kRadiusShare * extent);
@@ -186,6 +206,8 @@ SettingValues valuesOf(const ImsOptions& o) {
   return {{"mode", wordOf(kMode, o.mode)},
           {"samples", std::to_string(o.samples)},
           {"spacing", std::to_string(o.spacing)},
+          {"eye_steps", std::to_string(o.eyeSteps)},
+          {"lamp_table", std::to_string(o.lampTable)},
           {"walks", std::to_string(o.walks)},
           {"walk_flights", wordOf(kFlights, o.flights)},
           {"retrace", fmt::format("{}", o.retrace)},

@@ -4,6 +4,7 @@
 #include "methods/instant_scattering/compensation.h"
 #include "methods/instant_scattering/receivers.h"
 #include "methods/method.h"
+#include "methods/settings_reader.h"
 
 namespace virga {
 
@@ -14,8 +15,10 @@ struct ImsOptions {
   enum class Show { picture, lost, compensation };
 
   Mode mode = Mode::exact;
-  int samples = 16;  ///< fast: of a coarse pixel in each pass; frame: points of its eye ray that are lit
-  int spacing = 8;   ///< fast, frame: of coarse pixels [pixels]
+  int samples = 16;   ///< fast: of a coarse pixel in each pass; frame: points of its eye ray that are lit
+  int spacing = 8;    ///< fast, frame: of coarse pixels [pixels]
+  int eyeSteps = 64;  ///< fast: of an eye ray through each stretch of media
+  int lampTable = 0;  ///< fast: nodes of lamps' tables in either direction; 0: light from lamps is marched
   int walks = 0;
   FlightMode flights = FlightMode::tracking;  ///< of the walks
   float retrace = 1;  ///< part of the walks that is traced anew in each frame; 1: all, and none is kept
@@ -44,9 +47,11 @@ class ImsSettings {
   ImsOptions forScene(const Scene& scene) const;
 
  private:
+  void readMarching(const SettingsReader& reader);
+
   ImsOptions given_;
   std::optional<float> radius_;
-  std::optional<int> walks_, lights_, maxDepth_, rrDepth_;
+  std::optional<int> lampTable_, walks_, lights_, maxDepth_, rrDepth_;
   std::optional<int> compensate_;
 };
 

@@ -5,19 +5,21 @@
 
 #include "methods/instant_scattering/ims_options.h"
 #include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/pixel_features.h"
 #include "methods/pixels.h"
 
 namespace virga {
 
 /// Samples of pixels, lit by one set of virtual lights: eye paths that gather at each vertex that can be connected to.
-/// The scene and the lights must outlive it.
+/// The scene, the lights and the tables must outlive it.
 class ImsPixels {
  public:
-  /// The light of lamps in all layers, or without those that virtual lights light: x1 alone.
-  enum class Part { all, direct };
+  /// The light of lamps in all layers; without those that virtual lights light: x1 alone; in these alone, the others
+  /// are not to be used.
+  enum class Part { all, direct, indirect };
 
   ImsPixels(const Scene& scene, const VirtualLights& lights, const LightVisibilityView& visibility,
-            const ImsOptions& options)
+            const ImsOptions& options, View<LampTable> lampTables = {})
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         options_(options),
@@ -27,7 +29,7 @@ class ImsPixels {
         glowTracer_(scene_.view, rays_, glowPaths_),
         gatherer_(scene_.view, rays_, lights, visibility, options_.gather),
         compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
-        marched_(scene_.view, rays_) {}
+        marched_(scene_.view, rays_, nullptr, lampTables) {}
   /// Is the light of lamps found by marching? Not where there are panes, which it does not see through, nor from lamps
   /// in homogeneous media alone: there the tracer's equiangular sampling leaves less noise.
   static bool marches(const SceneView& scene) {
@@ -46,15 +48,14 @@ class ImsPixels {
     if (options_.path.maxDepth == 0) return {};
     Sampler sampler(id);
     const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
-    if (LayerRadiance marched;
-        part == Part::direct && marches_ && marched_.add(camera, marched, RandomNumbers{sampler}))
-      return marched;
+    if (LayerRadiance marched; part == Part::direct && marches_ && march(camera, marched, sampler)) return marched;
     Tracer::Path path = tracer_.start(camera);
     Tracer::Record record;
     path.record = &record;
     // The path finds what clamping takes, or nothing of what virtual lights could light.
-    const bool compensates = part == Part::all && options_.compensate == ImsOptions::Compensate::path &&
+    const bool compensates = part != Part::direct && options_.compensate == ImsOptions::Compensate::path &&
                              options_.show == ImsOptions::Show::picture;
+    path.lightsX1 = part != Part::indirect;
     path.bound = compensates ? options_.gather.bound : kInfinity;
     for (bool goesOn = true; goesOn;) {
       record.vertex.kind = VertexKind::none;
@@ -68,6 +69,22 @@ class ImsPixels {
         lightVertex(record, events, path, sampler);
     }
     return path.radiance;
+  }
+  /// Is the light of x1 alone found by marching?
+  bool marches() const { return marches_; }
+  /// What pixel (x, y) shows, by the ray through its middle.
+  PixelFeatures features(int x, int y) const { return pixelFeatures(scene_, x, y, options_.eyeSteps); }
+  /// Likewise, and the light of x1 alone, by the same ray unless it sees a mirror or glass. Only where marches().
+  LayerRadiance sampleMiddle(int x, int y, const SampleId& id, PixelFeatures& features) const {
+    MarchedEye eye;
+    marchMiddle(scene_, x, y, options_.eyeSteps, eye);
+    features = pixelFeatures(eye);
+    if (!eye.plain) return sample(x, y, id, Part::direct);
+    LayerRadiance radiance;
+    Sampler sampler(id);
+    RandomNumbers numbers{sampler};
+    marched_.add(eye, radiance, numbers);
+    return radiance;
   }
   /// The light of media that glow, which virtual lights do not carry, in all layers: by paths of its own.
   LayerRadiance sampleGlow(int x, int y, SampleId id) const {
@@ -86,6 +103,14 @@ class ImsPixels {
     return path;
   }
 
+  /// False, and nothing added, where the ray meets a mirror, glass or a narrow bsdf first.
+  bool march(const CameraRay& camera, LayerRadiance& radiance, Sampler& sampler) const {
+    RandomNumbers numbers{sampler};
+    MarchedEye eye;
+    marchEye(scene_.view, rays_, camera, numbers.shift(), eye, options_.eyeSteps);
+    if (eye.plain) marched_.add(eye, radiance, numbers);
+    return eye.plain;
+  }
   void lightVertex(const Tracer::Record& at, int events, Tracer::Path& path, Sampler& sampler) const {
     KnownSpace known;
     if (options_.show != ImsOptions::Show::compensation)

@@ -4,6 +4,7 @@
 #include "core/sampler.h"
 #include "methods/instant_scattering/eye_march.h"
 #include "methods/instant_scattering/frame_kernels.h"
+#include "methods/instant_scattering/lamp_tables.h"
 
 namespace virga {
 
@@ -78,18 +79,12 @@ class MarchedLight {
   static constexpr int kLightSteps = 24;  ///< toward a lamp
   static constexpr int kFogPoints = 24;   ///< on the eye ray that are lit by lamps at infinity, with FogLamps
 
-  /// `lamps`: points in fog are lit by these, wherever they are known; null: by none.
-  VIRGA_HD MarchedLight(const SceneView& scene, const Rays& rays, const FogLamps* lamps = nullptr)
-      : scene_(scene), rays_(rays), lamps_(lamps) {}
+  /// `lamps`: points in fog are lit by these, wherever they are known; null: by none. `tables`, of each emitter or of
+  /// none: where there is one it takes the place of the march toward the lamp.
+  VIRGA_HD MarchedLight(const SceneView& scene, const Rays& rays, const FogLamps* lamps = nullptr,
+                        View<LampTable> tables = {})
+      : scene_(scene), rays_(rays), lamps_(lamps), tables_(tables) {}
 
-  /// False, and nothing added, where the ray meets a mirror, glass or a narrow bsdf first.
-  template <class Numbers>
-  VIRGA_HD bool add(const CameraRay& camera, LayerRadiance& radiance, Numbers numbers) const {
-    MarchedEye eye;
-    marchEye(scene_, rays_, camera, numbers.shift(), eye);
-    if (eye.plain) add(eye, radiance, numbers);
-    return eye.plain;
-  }
   /// Of an eye ray that has been marched already and is broad.
   template <class Numbers>
   VIRGA_HD void add(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
@@ -118,13 +113,14 @@ class MarchedLight {
       const EmitterView& emitter = scene_.emitters[lamp.index];
       if (inFog && isAimedAt(emitter)) return;
       const LightSample light = sampleLight(scene_, emitter, p, drawn.u);
-      const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, light, numbers);
+      const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, lamp.index, light, numbers);
       radiance.add(Layer::directMedia, found * (share / lamp.probability));
     });
   }
   /// sigma_t tau was the weight; here it is the light that the media scatter toward wo over their sigma_t.
   template <class Numbers>
-  VIRGA_HD Rgb lampAt(Vec3 p, Vec3 wo, const MediaState& media, const LightSample& light, Numbers& numbers) const {
+  VIRGA_HD Rgb lampAt(Vec3 p, Vec3 wo, const MediaState& media, int lamp, const LightSample& light,
+                      Numbers& numbers) const {
     if (!(light.pdf > 0)) return {};
     Rgb sigmaT, scattered;
     for (int i = 0; i < media.count(); ++i) {
@@ -135,7 +131,7 @@ class MarchedLight {
     }
     for (int c = 0; c < 3; ++c) scattered[c] = sigmaT[c] > 0 ? scattered[c] / sigmaT[c] : 0;
     if (isBlack(scattered)) return {};
-    return scattered * light.radiance * (lampSeen({{p, light.wi}, media, 0}, p, light, numbers) / light.pdf);
+    return scattered * light.radiance * (lampSeen({{p, light.wi}, media, 0}, p, lamp, light, numbers) / light.pdf);
   }
 
   /// The ray passes a single stretch of a single homogeneous medium whose phase function is plain.
@@ -166,7 +162,7 @@ class MarchedLight {
       if (!(light.distance > 0)) continue;
       light.wi = way / light.distance;
       radiance.add(Layer::directMedia,
-                   found * medium.albedo * lampSeen({{p, light.wi}, eye.media[0], 0}, p, light, numbers));
+                   found * medium.albedo * lampSeen({{p, light.wi}, eye.media[0], 0}, p, kNoTable, light, numbers));
     }
   }
 
@@ -191,24 +187,28 @@ class MarchedLight {
       const Rgb value = SurfaceScattering(eye.side).scattering(wo, light.wi) * light.radiance;
       if (isBlack(value)) continue;
       const MediaRay leaving = leaveSurface(scene_, point, wo, light.wi, eye.at.media);
-      const Rgb seen = lampSeen(leaving, point.p, light, numbers);
+      const Rgb seen = lampSeen(leaving, point.p, lamp.index, light, numbers);
       radiance.add(Layer::directSurface,
                    through * value * seen / (light.pdf * lamp.probability * static_cast<float>(count)));
     }
   }
 
+  static constexpr int kNoTable = -1;
+  /// `lamp`: index of the emitter, or kNoTable.
   template <class Numbers>
-  VIRGA_HD Rgb lampSeen(const MediaRay& r, Vec3 x, const LightSample& light, Numbers& numbers) const {
+  VIRGA_HD Rgb lampSeen(const MediaRay& r, Vec3 x, int lamp, const LightSample& light, Numbers& numbers) const {
     ConnectingRay ray{r, kInfinity};
     if (!std::isinf(light.distance)) ray = aimAt(scene_, r, x + light.wi * light.distance);
     if (!(ray.tMax > 0)) return Rgb(1.f);
     if (rays_.occluded(ray.at.ray, ray.tMax)) return {};
+    if (lamp < tables_.size && lamp >= 0 && tables_[lamp].present()) return transmittanceOf(tables_[lamp].depthTo(x));
     return marchedTransmittance(scene_, rays_, ray.at, ray.tMax, kLightSteps, numbers.shift());
   }
 
   const SceneView& scene_;
   const Rays& rays_;
   const FogLamps* lamps_;
+  View<LampTable> tables_;
 };
 
 /// The points on lamps that `numbers` choose, of those that isAimedAt().

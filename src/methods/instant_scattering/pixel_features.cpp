@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/pixel_features.h"
 
-#include "core/parallel.h"
+#include "core/random.h"
 #include "methods/instant_scattering/eye_march.h"
 
 namespace virga {
@@ -50,23 +50,17 @@ PixelFeatures pixelFeatures(const MarchedEye& eye) {
   return f;
 }
 
-PixelFeatures pixelFeatures(const Scene& scene, int x, int y) {
+void marchMiddle(const Scene& scene, int x, int y, int steps, MarchedEye& eye) {
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  MarchedEye eye;
-  marchEye(scene.view, rays, scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f), 0, eye);
-  return pixelFeatures(eye);
+  const float shift = toUnitFloat(hash32(scene.camera.pixelStream(x, y)));
+  const CameraRay camera = scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  marchEye(scene.view, rays, camera, shift, eye, steps);
 }
 
-std::vector<PixelFeatures> pictureFeatures(const Scene& scene, const std::stop_token& stop) {
-  const int width = scene.camera.width, height = scene.camera.height;
-  std::vector<PixelFeatures> features(static_cast<size_t>(width) * static_cast<size_t>(height));
-  parallelFor(height, 4, [&](int64_t y) {
-    if (stop.stop_requested()) return;
-    for (int x = 0; x < width; ++x)
-      features[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)] =
-          pixelFeatures(scene, x, static_cast<int>(y));
-  });
-  return features;
+PixelFeatures pixelFeatures(const Scene& scene, int x, int y, int steps) {
+  MarchedEye eye;
+  marchMiddle(scene, x, y, steps, eye);
+  return pixelFeatures(eye);
 }
 
 }  // namespace virga

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <stop_token>
-#include <vector>
-
 #include "methods/instant_scattering/eye_march.h"
 #include "scene/scene.h"
 
@@ -21,10 +18,10 @@ struct PixelFeatures {
 
 /// Of an eye ray.
 PixelFeatures pixelFeatures(const MarchedEye& eye);
-/// Of the ray through the middle of pixel (x, y); there is nothing random.
-PixelFeatures pixelFeatures(const Scene& scene, int x, int y);
-
-/// Of all pixels, row by row. A stop leaves rows out.
-std::vector<PixelFeatures> pictureFeatures(const Scene& scene, const std::stop_token& stop = {});
+/// Marches the ray through the middle of pixel (x, y). Nothing is random; the steps of neighbours are shifted against
+/// each other, so that what they miss does not add up to a pattern.
+void marchMiddle(const Scene& scene, int x, int y, int steps, MarchedEye& eye);
+/// Of that ray.
+PixelFeatures pixelFeatures(const Scene& scene, int x, int y, int steps = MarchedEye::kSteps);
 
 }  // namespace virga

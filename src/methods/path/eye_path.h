@@ -56,6 +56,7 @@ struct EyePath {
   Record* record = nullptr;      ///< where to write down vertices that virtual lights can light; null: nowhere
   float bound = 0;               ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
   Link link;
+  bool lightsX1 = true;           ///< lamps are connected at x1, too; no: somebody else finds their light there
   LampGuide lamp;                 ///< of the last vertex, for technique B on the next segment
   float promise = 1, before = 1;  ///< LampGuide::promise of the last direction and of the one before
 

@@ -178,6 +178,9 @@ class PathTracer {
     return lamps_ && scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
   }
 
+  /// At a vertex that is in the path's layers already.
+  VIRGA_HD bool connectsHere(const Path& path) const { return hasLights() && (path.lightsX1 || path.layers.hasX2()); }
+
   VIRGA_HD LampGuide drawLamp(const Path& path, Sampler& sampler) const {
     const auto choice = scene_.emitterChoice.sample(path.one(sampler));
     const EmitterView& emitter = scene_.emitters[choice.index];
@@ -203,7 +206,7 @@ class PathTracer {
   /// Technique B: a vertex on the segment by its angle about a point on a light, connected to that point.
   VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media,
                                    Sampler& sampler) const {
-    if (!hasLights()) return;
+    if (!hasLights() || (!path.lightsX1 && !path.layers.hasX1())) return;
     const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
     const LightPoint& on = lamp.on;
@@ -240,7 +243,7 @@ class PathTracer {
   /// Technique A at a medium vertex.
   VIRGA_HD void connectMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
                               Sampler& sampler) const {
-    if (!hasLights()) return;
+    if (!connectsHere(path)) return;
     const Connection c = sampleConnection(path, x, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const float own = c.choice * c.light.pdf;
@@ -261,7 +264,7 @@ class PathTracer {
   /// Technique A' at a surface vertex.
   VIRGA_HD void connectSurface(Path& path, const SurfacePoint& point, const Side& side, const MediaState& media,
                                Sampler& sampler) const {
-    if (!hasLights()) return;
+    if (!connectsHere(path)) return;
     path.last.segment = {};
     const Connection c = sampleConnection(path, point.p, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;

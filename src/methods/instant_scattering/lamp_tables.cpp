@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/instant_scattering/lamp_tables.h"
+
+#include "core/parallel.h"
+#include "methods/instant_scattering/eye_march.h"
+#include "transport/virtual_lights.h"
+
+namespace virga {
+namespace {
+
+/// A wider square of directions would waste its corners: all around is better.
+constexpr float kMostReach = 1.5f;
+
+bool isBounded(const MediumView& medium) {
+  return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
+}
+
+Affine inverse(const Affine& a) {
+  Matrix4 m;
+  const Vec3 columns[4] = {a.x, a.y, a.z, a.translation};
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(columns[column][row]);
+  return Affine(m.inverse());
+}
+
+/// What the cells of a grid fill that are not empty, in the world.
+void extendByGrid(const MediumView& medium, Bounds& bounds) {
+  const CoarseGridView& cells = medium.density.majorant;
+  Bounds filled;
+  for (int k = 0; k < cells.nz; ++k)
+    for (int j = 0; j < cells.ny; ++j)
+      for (int i = 0; i < cells.nx; ++i) {
+        if (!(cells.cell(i, j, k) > 0)) continue;
+        const Vec3 lo =
+            cells.origin + Vec3(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) * cells.cellSize;
+        filled.extend(lo), filled.extend(lo + cells.cellSize);
+      }
+  if (filled.empty()) return;
+  const Affine toWorld = inverse(medium.worldToDensity);
+  for (int i = 0; i < 8; ++i) bounds.extend(toWorld.point(filled.corner(i)));
+}
+
+bool isPointLike(const EmitterView& e) {
+  return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::spot;
+}
+
+int lampsOf(const SceneView& scene) {
+  return static_cast<int>(std::count_if(scene.emitters.begin(), scene.emitters.end(), isPointLike));
+}
+int channelsOf(const SceneView& scene) { return scene.chromatic ? 3 : 1; }
+
+int radiiOf(int side) { return std::max(2, side / 2); }
+
+LampTable tableFor(const Bounds& media, Vec3 p, int side, int channels) {
+  LampTable table;
+  table.side = side, table.radii = radiiOf(side), table.channels = channels, table.p = p;
+  const Vec3 way = media.center() - p;
+  const float d = length(way), radius = 0.5f * length(media.extent());
+  table.last = d + radius;
+  if (!(d > 1.001f * radius)) return table;
+  table.first = d - radius;
+  const Frame frame(way / d);
+  // As far as the corners of the bounds reach.
+  float reach = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 w = frame.toLocal(media.corner(i) - p);
+    const float most = std::max(std::fabs(w.x), std::fabs(w.y));
+    reach = w.z > 0 ? std::max(reach, most / w.z) : kInfinity;
+  }
+  if (reach > kMostReach) return table;
+  table.frame = frame, table.reach = reach * 1.0001f;
+  return table;
+}
+
+/// Marches from the lamp along one node's direction.
+void fillDirection(const Scene& scene, const LampTable& table, const MediaState& media, int row, int column,
+                   float* depth) {
+  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  const auto place = [&](int n) { return 2 * static_cast<float>(n) / static_cast<float>(table.side - 1) - 1; };
+  MediaRay r{{table.p, table.direction({place(column), place(row)})}, media, 0};
+  Rgb sum;
+  int m = 0;
+  float radius = table.radius(0);  // number m
+  float* nodes = depth + table.offset(0, row, column);
+  const size_t channelSize = table.offset(1, 0, 0);
+  const auto set = [&](Rgb value) {
+    for (int c = 0; c < table.channels; ++c)
+      nodes[channelSize * static_cast<size_t>(c) + static_cast<size_t>(m)] = value[c];
+    radius = table.radius(++m);
+  };
+  walkMedia(scene.view, rays, r, table.last, [&](float t0, float t1) {
+    return marchMedia(scene.view, r.media, r.ray, t0, t1, table.radii, 0, [&](float a, float b, Rgb own) {
+      while (m < table.radii && radius < b) set(sum + own * (std::max(0.f, radius - a) / (b - a)));
+      sum += own;
+      return true;
+    });
+  });
+  while (m < table.radii) set(sum);
+}
+
+}  // namespace
+
+LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop) {
+  const SceneView& view = scene.view;
+  if (lampTableSide(view) == 0) return;
+  Bounds bounds;
+  for (const MediumView& medium : view.media) extendByGrid(medium, bounds);
+  if (bounds.empty()) return;
+  const int endless = endlessMedium(scene), channels = channelsOf(view);
+  for (const EmitterView& emitter : view.emitters) {
+    tables_.emplace_back();
+    if (!isPointLike(emitter)) continue;
+    LampTable& table = tables_.back() = tableFor(bounds, emitter.position, side, channels);
+    std::vector<float>& depths = depths_.emplace_back(table.offset(channels, 0, 0));
+    table.depth = depths.data();
+    const MediaState media = mediaAt(scene, table.p, endless);
+    parallelFor(side, 1, [&](int64_t row) {
+      if (stop.stop_requested()) return;
+      for (int column = 0; column < side; ++column)
+        fillDirection(scene, table, media, static_cast<int>(row), column, depths.data());
+    });
+  }
+}
+
+int lampTableSide(const SceneView& scene) {
+  constexpr int kFew = 32, kMany = 256;
+  const int lamps = lampsOf(scene);
+  const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), isBounded);
+  if (lamps == 0 || lamps > LampTables::kMostLamps || scene.media.size == 0 || !bounded) return 0;
+  float voxels = 0;
+  for (const MediumView& medium : scene.media)
+    voxels = std::max(voxels, maxComponent(medium.density.supportHi - medium.density.supportLo));
+  return static_cast<int>(clamp(1.5f * voxels, kFew, kMany));
+}
+
+size_t lampTableBytes(const SceneView& scene, int side) {
+  return static_cast<size_t>(lampsOf(scene) * channelsOf(scene)) * static_cast<size_t>(side * side) *
+         static_cast<size_t>(radiiOf(side)) * sizeof(float);
+}
+
+}  // namespace virga
