@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Installs what is missing, checks the layout of the code, builds, and runs every test: all of them in the release build (whose own assertions stay on),
-# then all but the slow ones (rendering until statistics tell) under AddressSanitizer and UndefinedBehaviorSanitizer.
+# then all but the slow ones (of methods, which render until statistics tell) under AddressSanitizer and UndefinedBehaviorSanitizer.
 # Fails at the first step that fails; the last lines are the test runner's summary.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -25,4 +25,4 @@ scripts/build.sh asan-ubsan
 
 echo "== tests under sanitizers"
 export UBSAN_OPTIONS=print_stacktrace=1
-ctest --test-dir build/asan-ubsan --output-on-failure --no-tests=error --parallel "$jobs" --label-exclude '^(methods|slow)$'
+ctest --test-dir build/asan-ubsan --output-on-failure --no-tests=error --parallel "$jobs"

@@ -135,10 +135,11 @@ TEST(Airlight, SingleScatteringAgreesWithQuadrature) {
       expectAgreement(
           a.radiance,
           [&](int passes, uint64_t seed) {
-            const RenderSession session = rendered(scene, {.passes = passes,
-                                                           .seed = seed,
-                                                           .layers = LayerMask::all(),
-                                                           .settings = {{"equiangular_depth", equiangular}}});
+            const RenderSession session =
+                rendered(scene, {.passes = passes,
+                                 .seed = seed,
+                                 .layers = LayerMask::all(),
+                                 .settings = {{"equiangular_depth", equiangular}, {"max_depth", "2"}}});
             return pixelMoments(session.film().layer(Layer::directMedia));
           },
           fmt::format("sigma_s {} equiangular depth {}", a.sigmaS, equiangular));

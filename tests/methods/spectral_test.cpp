@@ -148,7 +148,7 @@ TEST(Spectral, TheTestNoticesFivePercent) {
     return std::string(kCamera) + kLamp + kGround +
            box(c == 1 ? homogeneous({0.2, 2.1, 8}, c) : homogeneous({0.2, 2, 8}, c));
   };
-  EXPECT_GT(worstDeviation(wrong, 2048, 7, &precision), 3.6);
+  EXPECT_GT(worstDeviation(wrong, 1024, 7, &precision), 3.6);
 }
 
 // Were the channel of each flight picked without weighing it against the others, r - g would be noisier than r itself.

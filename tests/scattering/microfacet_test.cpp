@@ -36,16 +36,20 @@ std::string nameOf(const Microfacet& f) {
          std::to_string(f.alphaX) + " " + std::to_string(f.alphaY);
 }
 
+/// Enough for every control below to be noticed.
+constexpr int64_t kDraws = 100'000;
+
 double normalsP(const Microfacet& drawn, const Microfacet& claimed, Vec3 wo) {
   return stats::chiSquared(
-      {}, [&](Vec2 u) { return drawn.sampleNormal(wo, u); }, [&](Vec3 m) { return claimed.pdf(wo, m); });
+      {.samples = kDraws}, [&](Vec2 u) { return drawn.sampleNormal(wo, u); },
+      [&](Vec3 m) { return claimed.pdf(wo, m); });
 }
 
 template <class Model>
 double samplingP(const Model& drawn, const Model& claimed, Vec3 wo, Vec3 axis) {
   Pcg32 choices(99);
   return stats::chiSquared(
-      {.theta = 24, .axis = axis},
+      {.theta = 24, .axis = axis, .samples = kDraws},
       [&](Vec2 u) -> std::optional<Vec3> {
         const BsdfSample s = drawn.sample(wo, u, choices.next());
         return s.pdf > 0 ? std::optional(s.wi) : std::nullopt;

@@ -230,17 +230,18 @@ TEST(Dense, FollowsTheConventionsOfVol) {
 
 TEST(Sparse, LookupEqualsItsPlainTwin) {
   const SampleGrid sample = test::lumpyGrid(0.05f);
-  for (Storage storage : {Storage::sparse, Storage::dense}) {
-    const GridPtr grid = viaVdb(sample, {.storage = storage});
-    ASSERT_EQ(grid->view().kind, storage == Storage::sparse ? GridView::Kind::sparse : GridView::Kind::dense);
-    test::Sequence random(7);
-    for (int n = 0; n < 100000; ++n) {
-      const Vec3 p(static_cast<float>(random.next() * 50 - 14), static_cast<float>(random.next() * 60 - 24),
-                   static_cast<float>(random.next() * 42 - 6));
-      const double plain =
-          sample.interpolated(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
-      ASSERT_NEAR(static_cast<double>(grid->view().lookup(p)), plain, 1e-5) << p.x << " " << p.y << " " << p.z;
-    }
+  const GridPtr sparse = viaVdb(sample, {.storage = Storage::sparse}),
+                dense = viaVdb(sample, {.storage = Storage::dense});
+  ASSERT_EQ(sparse->view().kind, GridView::Kind::sparse);
+  ASSERT_EQ(dense->view().kind, GridView::Kind::dense);
+  test::Sequence random(7);
+  for (int n = 0; n < 100000; ++n) {
+    const Vec3 p(static_cast<float>(random.next() * 50 - 14), static_cast<float>(random.next() * 60 - 24),
+                 static_cast<float>(random.next() * 42 - 6));
+    const double plain =
+        sample.interpolated(static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z));
+    ASSERT_NEAR(static_cast<double>(sparse->view().lookup(p)), plain, 1e-5) << p.x << " " << p.y << " " << p.z;
+    ASSERT_NEAR(static_cast<double>(dense->view().lookup(p)), plain, 1e-5) << p.x << " " << p.y << " " << p.z;
   }
 }
 

@@ -29,33 +29,39 @@ openvdb::math::Transform::Ptr transformOf(const SampleGrid& sample) {
 }
 
 template <class GridType>
-openvdb::GridBase::Ptr build(const SampleGrid& sample) {
+openvdb::GridBase::Ptr filled(const SampleGrid& sample) {
   using Value = typename GridType::ValueType;
   auto grid = GridType::create(Value(sample.background));
   for (const Fill& fill : sample.fills)
     grid->sparseFill(openvdb::CoordBBox(openvdb::Coord(fill.lo.data()), openvdb::Coord(fill.hi.data())),
                      Value(fill.value), fill.active);
+  return grid;
+}
+
+// What no density may be stays empty: by name the library makes it, and its trees need not be compiled here.
+openvdb::GridBase::Ptr valuesOf(const SampleGrid& sample) {
+  switch (sample.type) {
+    case SampleGrid::Type::doubles:
+      return filled<openvdb::DoubleGrid>(sample);
+    case SampleGrid::Type::vectors:
+      return openvdb::GridBase::createGrid("Tree_vec3s_5_4_3");
+    case SampleGrid::Type::integers:
+      return openvdb::GridBase::createGrid("Tree_int32_5_4_3");
+    case SampleGrid::Type::booleans:
+      return openvdb::GridBase::createGrid("Tree_bool_5_4_3");
+    default:
+      return filled<openvdb::FloatGrid>(sample);
+  }
+}
+
+openvdb::GridBase::Ptr gridOf(const SampleGrid& sample) {
+  openvdb::initialize();
+  const openvdb::GridBase::Ptr grid = valuesOf(sample);
   grid->setName(sample.name);
   grid->setTransform(transformOf(sample));
   grid->setGridClass(sample.levelSet ? openvdb::GRID_LEVEL_SET : openvdb::GRID_FOG_VOLUME);
   grid->setSaveFloatAsHalf(sample.type == SampleGrid::Type::halves);
   return grid;
-}
-
-openvdb::GridBase::Ptr gridOf(const SampleGrid& sample) {
-  openvdb::initialize();
-  switch (sample.type) {
-    case SampleGrid::Type::doubles:
-      return build<openvdb::DoubleGrid>(sample);
-    case SampleGrid::Type::vectors:
-      return build<openvdb::Vec3SGrid>(sample);
-    case SampleGrid::Type::integers:
-      return build<openvdb::Int32Grid>(sample);
-    case SampleGrid::Type::booleans:
-      return build<openvdb::BoolGrid>(sample);
-    default:
-      return build<openvdb::FloatGrid>(sample);
-  }
 }
 
 nanovdb::GridHandle<> nanoOf(const SampleGrid& sample, NvdbChecksum checksum) {

@@ -41,7 +41,7 @@ struct SampleGrid {
   Type type = Type::floats;
   bool levelSet = false;
   float background = 0;
-  std::vector<Fill> fills;
+  std::vector<Fill> fills;  ///< of floats, halves and doubles; grids of other types are empty
   Matrix4 indexToWorld;
   Transform transform = Transform::affine;
 
