@@ -40,8 +40,8 @@ void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& 
   }
 }
 
-void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen) {
-  kernels::seenThroughFog(light, to, sigmaT, seen);
+void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {
+  kernels::seenThroughFog(from, to, sigmaT, seen);
 }
 
 void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b) {
@@ -56,8 +56,8 @@ void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind
     kernels::seenThroughMap<EndKind::isotropic>(light, to, map, seen);
 }
 
-void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen) {
-  kernels::seenThroughTable(light, to, table, seen);
+void lookThroughTable(const KernelPoint& from, const KernelReceivers& to, const DepthTable& table, float* seen) {
+  kernels::seenThroughTable(from, to, table, seen);
 }
 
 }  // namespace virga

@@ -19,6 +19,11 @@ struct KernelLight {
   float anisotropy;  ///< g of Henyey and Greenstein's phase function; 0 on surfaces
 };
 
+/// A place.
+struct KernelPoint {
+  float x, y, z;
+};
+
 /// Points that are lit, of one kind. Arrays of `count`.
 struct KernelReceivers {
   int count = 0;
@@ -51,11 +56,9 @@ struct DepthView {
 
 /// Optical depths at directions and distances: nodes of an octahedral map of the stretched directions, and radii.
 struct DepthTable {
-  static constexpr int kSide = 12;   ///< nodes along the map's edge; those on its border are there twice
-  static constexpr int kRadii = 24;  ///< the first at 0
-  static constexpr int kSize = kSide * kSide * kRadii;
-
   const float* depth;  ///< [row][column][radius]
+  int side;            ///< nodes along the map's edge; those on its border are there twice
+  int radii;           ///< the first at 0
   DepthView view;
 };
 
@@ -139,11 +142,11 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
   }
 }
 
-/// Transmittance from a light through a homogeneous medium that is everywhere.
-VIRGA_HD static inline void seenThroughFog(const KernelLight& l, const KernelReceivers& to, float sigmaT, float* seen) {
+/// Transmittance from a point through a homogeneous medium that is everywhere.
+VIRGA_HD static inline void seenThroughFog(const KernelPoint& l, const KernelReceivers& to, float sigmaT, float* seen) {
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
-    const float x = l.px - to.px[i], y = l.py - to.py[i], z = l.pz - to.pz[i];
+    const float x = l.x - to.px[i], y = l.y - to.py[i], z = l.z - to.pz[i];
     seen[i] = std::exp(-sigmaT * std::sqrt(x * x + y * y + z * z));
   }
 }
@@ -179,33 +182,34 @@ VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelRec
   }
 }
 
-/// Multiplies `seen` by the transmittance that a light's table knows.
-VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
+/// Multiplies `seen` by the transmittance that a point's table knows.
+VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
                                              float* seen) {
-  constexpr int kSide = DepthTable::kSide, kRadii = DepthTable::kRadii;
+  const int side = table.side, radii = table.radii;
   const float* __restrict depth = table.depth;
   const DepthView f = table.view;
-  const float scale = (kRadii - 1) * (kRadii - 1) / (f.last - f.first);
+  const auto columns = static_cast<float>(side), distances = static_cast<float>(radii);
+  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
-    const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
+    const float x = to.px[i] - l.x, y = to.py[i] - l.y, z = to.pz[i] - l.z + 1e-10f;
     const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / distance;
     const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
     const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
     const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
     float u, v;
     octahedral(a * turned, b * turned, c, u, v);
-    u = (u + 1) * (0.5f * (kSide - 1)), v = (v + 1) * (0.5f * (kSide - 1));
-    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), kRadii - 1.001f);
-    const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)),
-              row = static_cast<int>(std::fmin(v, kSide - 1.001f)), radius = static_cast<int>(m);
+    u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
+    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
+    const int column = static_cast<int>(std::fmin(u, columns - 1.001f)),
+              row = static_cast<int>(std::fmin(v, columns - 1.001f)), radius = static_cast<int>(m);
     const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row),
                 fm = m - static_cast<float>(radius);
-    const int at = (row * kSide + column) * kRadii + radius;
+    const int at = (row * side + column) * radii + radius;
     const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
-    const float d01 = depth[at + kRadii] * (1 - fm) + depth[at + kRadii + 1] * fm;
-    const float d10 = depth[at + kRadii * kSide] * (1 - fm) + depth[at + kRadii * kSide + 1] * fm;
-    const float d11 = depth[at + kRadii * (kSide + 1)] * (1 - fm) + depth[at + kRadii * (kSide + 1) + 1] * fm;
+    const float d01 = depth[at + radii] * (1 - fm) + depth[at + radii + 1] * fm;
+    const float d10 = depth[at + radii * side] * (1 - fm) + depth[at + radii * side + 1] * fm;
+    const float d11 = depth[at + radii * (side + 1)] * (1 - fm) + depth[at + radii * (side + 1) + 1] * fm;
     seen[i] *= std::exp(-((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv));
   }
 }
@@ -270,12 +274,12 @@ VIRGA_HD static inline void lightFog(const FogLamps& lamps, const FogRay& ray, f
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near);
 /// exp(-sigmaT d) for each receiver.
-void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen);
+void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen);
 /// Multiplies `seen` by 1 or 0: what the light's shadow map says.
 void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind kind, const KernelShadowMap& map,
                     float* seen);
-/// Multiplies `seen` by what the light's table says.
-void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen);
+/// Multiplies `seen` by what the point's table says.
+void lookThroughTable(const KernelPoint& from, const KernelReceivers& to, const DepthTable& table, float* seen);
 /// kernels::lightFog
 void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b);
 
