@@ -134,12 +134,15 @@ struct MarchedEye {
   }
 };
 
-/// Fills `eye`, steps shifted by `shift`.
+/// Fills `eye`, steps shifted by `shift`. `hit`: what the ray meets.
 template <class Rays>
-VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
-                       MarchedEye& eye) {
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, const RayHit& hit,
+                       float shift, MarchedEye& eye) {
   eye.at = leaveCamera(scene, camera.ray);
-  eye.hit = rays.nearest(eye.at.ray, camera.tMax);
+  eye.hit = hit;
+  eye.depth = Rgb();
+  eye.steps = eye.stretches = 0;
+  eye.plain = true;
   if (eye.hit.found()) {
     eye.point = surfacePoint(scene.surfaces[eye.hit.shape], eye.at.ray, eye.hit, scene.scale);
     eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
@@ -160,6 +163,11 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
     eye.stretches += kept ? 1 : 0;
     return true;
   });
+}
+template <class Rays>
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift,
+                       MarchedEye& eye) {
+  marchEye(scene, rays, camera, rays.nearest(camera.ray, camera.tMax), shift, eye);
 }
 
 }  // namespace virga

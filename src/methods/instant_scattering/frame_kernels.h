@@ -70,26 +70,6 @@ struct KernelShadowMap {
   float leastCosine;  ///< at flatter angles the bias grows no more
 };
 
-/// Fixed points of lamps, each of which lights one point of a ray through fog.
-struct FogLamps {
-  static constexpr int kCount = 4;
-
-  bool known[kCount] = {};  ///< there is one
-  bool alone = true;        ///< there are no lamps of other kinds
-  float px[kCount] = {}, py[kCount] = {}, pz[kCount] = {};
-  float nx[kCount] = {}, ny[kCount] = {}, nz[kCount] = {};  ///< normal; 0 where it sends to all sides alike
-  float all[kCount] = {};                                   ///< 1 where it does, otherwise 0
-  float r[kCount] = {}, g[kCount] = {}, b[kCount] = {};     ///< intensity along the normal, over kCount [W/sr]
-};
-
-/// A ray through one homogeneous medium, from t0 to t1.
-struct FogRay {
-  float ox, oy, oz, dx, dy, dz;
-  float t0, t1;      ///< [unit]
-  float sigmaT[3];   ///< [1/unit]
-  float anisotropy;  ///< g
-};
-
 namespace kernels {
 
 constexpr float kInverse4Pi = 0.07957747154594767f;
@@ -214,58 +194,6 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
   }
 }
 
-/// atan2 of y >= 0 (Abramowitz and Stegun 1964, 4.4.49: error 1e-5), and sine and cosine of an angle in [0, pi] by
-/// their series about pi / 2 (4e-6): the compiler has no vector code for those of the library.
-VIRGA_HD static inline float angleOf(float y, float x) {
-  const float ax = std::fabs(x), least = y < ax ? y : ax, most = y < ax ? ax : y;
-  const float q = least / (most + 1e-30f), q2 = q * q;
-  const float a = q * (0.9998660f + q2 * (-0.3302995f + q2 * (0.1801410f + q2 * (-0.0851330f + q2 * 0.0208351f))));
-  const float upper = y < ax ? a : 1.5707963f - a;
-  return x < 0 ? 3.1415927f - upper : upper;
-}
-VIRGA_HD static inline float sineOf(float angle) {
-  const float x = angle - 1.5707963f, x2 = x * x;
-  return 1 - x2 * (0.5f - x2 * (1 / 24.f - x2 * (1 / 720.f - x2 * (1 / 40320.f - x2 / 3628800.f))));
-}
-VIRGA_HD static inline float cosineOf(float angle) {
-  const float x = angle - 1.5707963f, x2 = x * x;
-  return -x * (1 - x2 * (1 / 6.f - x2 * (1 / 120.f - x2 * (1 / 5040.f - x2 / 362880.f))));
-}
-
-/// Where lamps light the ray, and what that adds, but for albedo, visibility and the transmittance from the lamp: t at
-/// the share `shift` of an equal part of the angle that the ray fills as seen from the lamp (Kulla and Fajardo 2012).
-VIRGA_HD static inline void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* __restrict t,
-                                     float* __restrict r, float* __restrict g, float* __restrict b) {
-  constexpr float kPart = 1.f / FogLamps::kCount;
-#pragma omp simd
-  for (int k = 0; k < FogLamps::kCount; ++k) {
-    const float x = lamps.px[k] - ray.ox, y = lamps.py[k] - ray.oy, z = lamps.pz[k] - ray.oz;
-    const float foot = x * ray.dx + y * ray.dy + z * ray.dz;
-    const float ex = x - ray.dx * foot, ey = y - ray.dy * foot, ez = z - ray.dz * foot;
-    const float height = std::sqrt(ex * ex + ey * ey + ez * ez) + 1e-4f * std::fabs(foot) + 1e-12f;
-    const float start = ray.t0 - foot, whole = ray.t1 - ray.t0;
-    const float range = angleOf(height * whole, height * height + start * (ray.t1 - foot));
-    const float angle = (static_cast<float>(k) + shift) * kPart * range;
-    const float s = sineOf(angle), c = cosineOf(angle);
-    // tan(a + b) - tan(a), over one denominator
-    const float along = s * (height * height + start * start) / std::fmax(height * c - start * s, 1e-20f);
-    const float at = std::fmin(std::fmax(along, 0.f), whole);
-    const float from = start + at, d2 = height * height + from * from, inverse = 1 / std::sqrt(d2);
-    // 1 / d^2 and the density height / (range d^2) cancel.
-    const float cosine =
-        lamps.all[k] + std::fmax(0.f, (lamps.nx[k] * (ray.dx * from - ex) + lamps.ny[k] * (ray.dy * from - ey) +
-                                       lamps.nz[k] * (ray.dz * from - ez)) *
-                                          inverse);
-    const float g2 = ray.anisotropy, toward = from * inverse;  // dot(wo, wi): wo = -d, wi = (y - p) / |y - p|
-    const float q = 1 + g2 * g2 + 2 * g2 * toward;
-    const float value = kInverse4Pi * (1 - g2 * g2) / (q * std::sqrt(q)) * cosine * range / height;
-    t[k] = ray.t0 + at;
-    r[k] = value * lamps.r[k] * ray.sigmaT[0] * std::exp(-ray.sigmaT[0] * at);
-    g[k] = value * lamps.g[k] * ray.sigmaT[1] * std::exp(-ray.sigmaT[1] * at);
-    b[k] = value * lamps.b[k] * ray.sigmaT[2] * std::exp(-ray.sigmaT[2] * at);
-  }
-}
-
 }  // namespace kernels
 
 // --- to be called; defined in frame_kernels.cpp ---
@@ -280,7 +208,5 @@ void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind
                     float* seen);
 /// Multiplies `seen` by what the point's table says.
 void lookThroughTable(const KernelPoint& from, const KernelReceivers& to, const DepthTable& table, float* seen);
-/// kernels::lightFog
-void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b);
 
 }  // namespace virga

@@ -8,12 +8,20 @@ CameraRay FramePixels::cameraRay(int x, int y) const {
   return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
 }
 
-bool FramePixels::direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const {
-  MarchedEye eye;
-  marchEye(scene_.view, rays_, cameraRay(x, y), numbers_.shift(), eye);
-  features = pixelFeatures(eye);
-  if (eye.plain) marched_.add(eye, radiance, numbers_);
-  return eye.plain;
+void FramePixels::direct(Block& block) const {
+  CameraRay cameras[Block::kSize];
+  RayPacket packet;
+  for (size_t i = 0; i < block.count; ++i) {
+    cameras[i] = cameraRay(block.pixels[i].x, block.pixels[i].y);
+    packet.set(static_cast<int>(i), cameras[i].ray, cameras[i].tMax);
+  }
+  const PacketHits hits = rays_.surfaces.nearest(packet);
+  for (size_t i = 0; i < block.count; ++i) {
+    marchEye(scene_.view, rays_, cameras[i], hits[i], numbers_.shift(), block.eyes[i]);
+    block.features[i] = pixelFeatures(block.eyes[i]);
+    block.radiance[i] = {};
+  }
+  packets_.add(std::span(block.eyes).first(block.count), std::span(block.radiance).first(block.count));
 }
 
 template <class Visit>

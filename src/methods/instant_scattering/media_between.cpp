@@ -79,12 +79,6 @@ DepthView viewOf(const Bounds& media, Vec3 p) {
           frame.n.x, frame.n.y, frame.n.z, 2 / height, d - radius, d + radius};
 }
 
-/// Everything outside the surfaces is in the same media: the camera's.
-bool sameMediaEverywhere(const SceneView& view) {
-  return view.boundaries.size == 0 && std::none_of(view.surfaces.begin(), view.surfaces.end(),
-                                                   [](const ShapeView& s) { return s.media.declared(); });
-}
-
 /// The way along a ray from a table's point: optical depths of its parts between the radii.
 class TableRay {
  public:
@@ -117,6 +111,11 @@ class TableRay {
 };
 
 }  // namespace
+
+bool sameMediaEverywhere(const SceneView& view) {
+  return view.boundaries.size == 0 && std::none_of(view.surfaces.begin(), view.surfaces.end(),
+                                                   [](const ShapeView& s) { return s.media.declared(); });
+}
 
 MediaBetween::MediaBetween(const Scene& scene, std::vector<Vec3> points, const Options& options,
                            const std::stop_token& stop)

@@ -46,4 +46,7 @@ class MediaBetween {
   std::vector<DepthView> views_;  ///< of each point's tables
 };
 
+/// Everything outside the surfaces is in the same media: the camera's.
+bool sameMediaEverywhere(const SceneView& view);
+
 }  // namespace virga
