@@ -37,16 +37,22 @@ struct FixedNumbers {
   VIRGA_HD float shift() const { return turned(0.5f, 0.6180340f); }
   /// In the pixel.
   VIRGA_HD Vec2 place() const { return {turned(0.5f, 0.7548777f), turned(0.5f, 0.5698403f)}; }
-  /// Van der Corput's sequence chooses the lamp, the additive one of the plastic number the place on it.
+  /// Van der Corput's sequence chooses the lamp, the additive one of the plastic number the place on it; of four points
+  /// a set whose mean is the middle, so that no side of the lamp is preferred.
   VIRGA_HD RandomNumbers::Lamp lamp(int k, int count) const {
     const auto n = static_cast<float>(k);
     const float choice =
         count == 1 ? 0.5f : toUnitFloat(reverseBits(static_cast<uint32_t>(k))) + 0.5f / static_cast<float>(count);
-    return {turned(choice, 0.4142136f),
-            {turned(0.5f + n * 0.7548777f, 0.7320508f), turned(0.5f + n * 0.5698403f, 0.2360680f)}};
+    Vec2 place(0.5f + n * 0.7548777f, 0.5f + n * 0.5698403f);
+    if (count == 4) place = {kFour[k % 4].x, kFour[k % 4].y};
+    return {turned(choice, 0.4142136f), {turned(place.x, 0.7320508f), turned(place.y, 0.2360680f)}};
   }
 
  private:
+  static constexpr struct {
+    float x, y;
+  } kFour[4] = {{0.375f, 0.125f}, {0.875f, 0.875f}, {0.125f, 0.625f}, {0.625f, 0.375f}};
+
   VIRGA_HD float turned(float x, float by) const {
     const float y = x + by * static_cast<float>(pass % 4096u);
     return std::fmin(y - std::floor(y), 0x1.fffffep-1f);

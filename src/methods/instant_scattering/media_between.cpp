@@ -13,11 +13,11 @@ namespace {
 Vec3 nodeDirection(const DepthView& f, int side, int column, int row) {
   const auto place = [side](int n) { return 2 * static_cast<float>(n) / static_cast<float>(side - 1) - 1; };
   const Vec3 stretched = fromOctahedron({place(column), place(row)});
-  const float c = 1 - (1 - stretched.z) / f.stretch;
-  const float turned =
-      std::sqrt(std::max(0.f, 1 - c * c) / std::max(1e-20f, square(stretched.x) + square(stretched.y)));
-  return Vec3(f.ux, f.uy, f.uz) * (stretched.x * turned) + Vec3(f.vx, f.vy, f.vz) * (stretched.y * turned) +
-         Vec3(f.wx, f.wy, f.wz) * c;
+  const float c = 1 - (1 - stretched.z) / f.stretch, sine = std::sqrt(std::max(0.f, 1 - c * c));
+  const float off = std::sqrt(square(stretched.x) + square(stretched.y));
+  // Against the axis, at the map's corners, any direction of the cone's border will do.
+  const float x = off > 0 ? stretched.x * sine / off : sine, y = off > 0 ? stretched.y * sine / off : 0.f;
+  return Vec3(f.ux, f.uy, f.uz) * x + Vec3(f.vx, f.vy, f.vz) * y + Vec3(f.wx, f.wy, f.wz) * c;
 }
 
 /// Calls visit(t0, t1, ray) for stretches of media along a ray from p, but for where grids hold nothing.
