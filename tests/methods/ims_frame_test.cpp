@@ -6,7 +6,7 @@
 
 #include "methods/ims_scenes.h"
 #include "methods/instant_scattering/frame_lights.h"
-#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/lamp_packets.h"
 #include "methods/rendering.h"
 #include "volume/grid.h"
 #include "volume/lookup_along.h"
@@ -186,12 +186,12 @@ TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
 }
 
 TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
-  FogLamps lamps;
-  for (int k = 0; k < FogLamps::kCount; ++k) {
-    lamps.known[k] = true, lamps.px[k] = 0.3f, lamps.py[k] = 0.5f, lamps.pz[k] = -2;
-    lamps.all[k] = 1, lamps.r[k] = lamps.g[k] = lamps.b[k] = 1.f / FogLamps::kCount;
-  }
-  const FogRay ray{0, 0, 0, 0, 0, -1, 0.5f, 4, {0.4f, 0.8f, 0}, 0.3f};
+  LampPoint lamp;
+  lamp.known = true, lamp.px = 0.3f, lamp.py = 0.5f, lamp.pz = -2;
+  lamp.all = 1;
+  FogRays fog{};  // the others are not there
+  fog.dz[3] = -1, fog.t0[3] = 0.5f, fog.t1[3] = 4;
+  fog.sigmaT[0][3] = 0.4f, fog.sigmaT[1][3] = 0.8f, fog.anisotropy[3] = 0.3f;
   double truth = 0;
   const int n = 200000;
   for (int i = 0; i < n; ++i) {
@@ -199,13 +199,18 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
     const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
     truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
   }
-  float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
-  constexpr int kShifts = 16;
+  KernelPlaces at;
+  RayPacket rays;
+  float value[3][RayPacket::kSize];
+  constexpr int kShifts = 64;
   double sum = 0;
   for (int shift = 0; shift < kShifts; ++shift) {
-    lightFog(lamps, ray, (static_cast<float>(shift) + 0.5f) / kShifts, t, r, g, b);
-    for (const float v : r) sum += static_cast<double>(v) / kShifts;
-    EXPECT_NEAR(b[0], 0, 0);
+    lightFog(lamp, fog, (static_cast<float>(shift) + 0.5f) / kShifts, 5, at, value, rays);
+    sum += static_cast<double>(value[0][3]) / kShifts;
+    EXPECT_EQ(value[2][3], 0);
+    EXPECT_EQ(value[0][0], 0);
+    EXPECT_GT(rays.tMax[3], 0);
+    EXPECT_EQ(rays.tMax[0], 0);
   }
   EXPECT_NEAR(sum, truth, 2e-3 * truth);
 }

@@ -48,10 +48,10 @@ class FramePass {
     if (stop.stop_requested()) return false;
     const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options_.spacing);
     const std::vector<Upsampling::Light> light = indirectLight(upsampling.computed(), stop);
-    forEachPixel(frame, stop, [&](int x, int y) {
+    upsampling.spread(light, stop, [&](int x, int y, const Upsampling::Light& indirect) {
       LayerRadiance radiance;
       std::copy_n(direct_[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
-      upsampling.at(light, x, y).addTo(radiance);
+      indirect.addTo(radiance);
       radiance += paths_.sampleGlow(x, y, idOf(x, y));
       frame.set(x, y, radiance);
     });

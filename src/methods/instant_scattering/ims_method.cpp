@@ -91,9 +91,9 @@ class ImsMethod final : public Method {
       const auto n = static_cast<size_t>(i);
       light[n] = indirectLight(pixels, computed[n], options.samples, id);
     });
-    forEachPixel(frame, stop, [&](int x, int y) {
+    upsampling_->spread(light, stop, [&](int x, int y, const Upsampling::Light& indirect) {
       LayerRadiance radiance = pixels.sample(x, y, of(id, x, y), ImsPixels::Part::direct);
-      upsampling_->at(light, x, y).addTo(radiance);
+      indirect.addTo(radiance);
       radiance += pixels.sampleGlow(x, y, of(id, x, y));
       frame.set(x, y, radiance);
     });

@@ -26,7 +26,7 @@ constexpr float kRadiusShare = 0.3f;
 /// Each leaves some lights of 64 bytes.
 constexpr int kMostWalks = 1 << 22;
 /// Of a frame, whose thousand lights share smaller maps' memory.
-constexpr int kFramePoints = 8, kFrameMapResolution = 32, kFrameMapPoints = 0;
+constexpr int kFramePoints = 4, kFrameMapResolution = 32, kFrameMapPoints = 0;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
