@@ -150,7 +150,7 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   lights_ = nullptr;
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
   VirtualLights traced =
-      traceVirtualLights(scene, {options.walks, maxDepth, options.flights}, {seed, 0, 0, index}, stop);
+      traceVirtualLights(scene, {options.walks, maxDepth, options.flights, options.aim}, {seed, 0, 0, index}, stop);
   FrameLights::Options kept;
   kept.most = options.frameLights;
   kept.turn = FixedNumbers{index}.shift();

@@ -16,6 +16,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"walks", "8192; 256 with shadow maps; frame: 16384", "random walks from the lights in each pass"},
     {"walk_flights", "tracking",
      "of these walks through heterogeneous media: tracking; marching: in steps of half a cell of the grid (biased)"},
+    {"aim", "0; frame: 0.5",
+     "share of the walks that start toward the media, where these do not fill the scene: few walks find a small cloud"},
     {"retrace", "1", "part of the walks that is traced anew in a frame where only media change; the others are kept"},
     {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
      "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of "

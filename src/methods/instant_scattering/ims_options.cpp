@@ -21,6 +21,9 @@ constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Random walks in each pass; shadow maps take time and memory for each of their lights.
 constexpr int kWalks = 8192, kWalksWithMaps = 256, kFrameWalks = 16384;
+/// Of a frame's walks. Measured: docs/decisions/ims-frames.md.
+constexpr float kFrameAim = 0.5f;
+constexpr float kMostAim = 0.95f;
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
 /// Each leaves some lights of 64 bytes.
@@ -112,11 +115,14 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error(fmt::format("--set ims.walks may be at most {}", kMostWalks),
                 {{}, "ask for more passes instead: each has walks of its own", {}});
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
+  o.aim = reader.share("aim").value_or(o.mode == ImsOptions::Mode::frame ? kFrameAim : 0);
+  if (o.aim > kMostAim) throw Error(fmt::format("--set ims.aim may be at most {}: some walks must go elsewhere", kMostAim));
   o.retrace = reader.share("retrace").value_or(o.retrace);
   if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
     throw Error("--set ims.retrace needs ims.mode=exact or fast: a frame traces its walks when the scene changes");
   if (o.retrace < 1 && o.flights == FlightMode::marching)
     throw Error("--set ims.retrace needs ims.walk_flights=tracking: kept walks have flights of their own");
+  if (o.retrace < 1 && o.aim > 0) throw Error("--set ims.aim needs ims.retrace=1: kept walks are not aimed");
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
@@ -188,6 +194,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"spacing", std::to_string(o.spacing)},
           {"walks", std::to_string(o.walks)},
           {"walk_flights", wordOf(kFlights, o.flights)},
+          {"aim", fmt::format("{}", o.aim)},
           {"retrace", fmt::format("{}", o.retrace)},
           {"lights", std::to_string(isFrame ? o.frameLights : o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},

@@ -4,6 +4,7 @@
 #include "core/octahedral.h"
 #include "core/parallel.h"
 #include "methods/instant_scattering/eye_march.h"
+#include "transport/media_bounds.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -20,55 +21,6 @@ Vec3 nodeDirection(const DepthView& f, int side, int column, int row) {
   return Vec3(f.ux, f.uy, f.uz) * x + Vec3(f.vx, f.vy, f.vz) * y + Vec3(f.wx, f.wy, f.wz) * c;
 }
 
-/// Calls visit(t0, t1, ray) for stretches of media along a ray from p, but for where grids hold nothing.
-template <class Visit>
-void visitStretches(const SceneView& view, const EmbreeRays& rays, MediaRay r, float tMax, const Visit& visit) {
-  walkMedia(view, rays, r, tMax, [&](float t0, float t1) {
-    for (int i = 0; i < r.media.count(); ++i) {
-      const MediumView& medium = view.media[r.media.medium(i)];
-      ClippedRange in{t0, t1};
-      if (!medium.homogeneous && !(medium.density.background > 0))
-        in = clipToBox(medium.worldToDensity.point(r.ray.o), medium.worldToDensity.vector(r.ray.d),
-                       medium.density.supportLo, medium.density.supportHi, t0, t1);
-      if (in.t0 < in.t1) visit(in.t0, in.t1, r);
-    }
-    return true;
-  });
-}
-
-/// Where boundaries say that media may be; everywhere, if there are media outside of them.
-Bounds whereMediaMayBe(const Scene& scene) {
-  const bool within = scene.view.cameraMedia.vacuum() &&
-                      std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
-                                   [](const ShapeView& s) { return s.media.declared(); });
-  return within ? scene.boundaryRays->bounds() : scene.view.bounds;
-}
-
-/// All of the scene that holds media, as far as rays from a few points tell.
-Bounds boundsOfMedia(const Scene& scene) {
-  constexpr int kPoints = 3, kDirections = 12;
-  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const int endless = endlessMedium(scene);
-  const DepthView around{1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1};
-  Bounds where = whereMediaMayBe(scene);
-  if (where.empty()) where = {Vec3(-1), Vec3(1)};
-  // Media without end, and no shapes among them: as far as may matter.
-  const float most = scene.view.bounds.empty() ? 1e3f : 2 * length(scene.view.bounds.extent());
-  const auto place = [](int n) { return (static_cast<float>(n % kPoints) + 0.5f) / kPoints; };
-  Bounds media;
-  for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
-    const Vec3 p = where.lo + where.extent() * Vec3(place(i), place(i / kPoints), place(i / kPoints / kPoints));
-    const MediaState state = mediaAt(scene, p, endless);
-    for (int n = 0; n < kDirections * kDirections; ++n) {
-      const Vec3 d = nodeDirection(around, kDirections, n % kDirections, n / kDirections);
-      visitStretches(scene.view, rays, {{p, d}, state, 0}, most, [&](float t0, float t1, const MediaRay& r) {
-        media.extend(r.ray.at(t0)), media.extend(r.ray.at(t1));
-      });
-    }
-  }
-  return media;
-}
-
 DepthView viewOf(const Bounds& media, Vec3 p) {
   const Vec3 way = media.center() - p;
   const float radius = 0.5f * length(media.extent()), d = length(way);
@@ -79,35 +31,37 @@ DepthView viewOf(const Bounds& media, Vec3 p) {
           frame.n.x, frame.n.y, frame.n.z, 2 / height, d - radius, d + radius};
 }
 
-/// The way along a ray from a table's point: optical depths of its parts between the radii.
-class TableRay {
- public:
-  TableRay(const DepthView& view, int radii) : view_(view), depth_(static_cast<size_t>(radii)) {}
+/// Distances of a table's nodes.
+std::vector<float> radiiOf(const DepthView& view, int count) {
+  std::vector<float> radii;
+  for (int m = 0; m < count; ++m)
+    radii.push_back(view.first + (view.last - view.first) * square(static_cast<float>(m) / static_cast<float>(count - 1)));
+  return radii;
+}
 
-  /// Adds what lies, evenly, between two distances.
+/// Optical depth along a ray as it was marched: linear between these distances.
+struct MarchedDepth {
+  struct Mark {
+    float t;
+    Rgb depth;
+  };
+  std::vector<Mark> marks;
+
+  void clear() { marks.assign(1, {0, {}}); }
   void add(float t0, float t1, Rgb depth) {
-    const float share = 1 / (t1 - t0);
-    const int last = static_cast<int>(depth_.size()) - 1;
-    for (int m = std::clamp(static_cast<int>(placeOf(t0)), 0, last - 1); m < last && radius(m) < t1; ++m) {
-      const float within = std::min(t1, radius(m + 1)) - std::max(t0, radius(m));
-      if (within > 0) depth_[static_cast<size_t>(m) + 1] += depth * (within * share);
+    if (t0 > marks.back().t) marks.push_back({t0, marks.back().depth});
+    marks.push_back({t1, marks.back().depth + depth});
+  }
+  /// At each radius, of one channel.
+  void write(const std::vector<float>& radii, int channel, float* out) const {
+    size_t next = 0;
+    for (const float r : radii) {
+      while (next < marks.size() && marks[next].t <= r) ++next;
+      const Mark& a = marks[std::max<size_t>(next, 1) - 1];
+      const Mark& b = marks[std::min(next, marks.size() - 1)];
+      *out++ = b.t > a.t ? lerp(a.depth[channel], b.depth[channel], (r - a.t) / (b.t - a.t)) : a.depth[channel];
     }
   }
-  /// Optical depths from the point to each radius, of one channel.
-  void write(int channel, float* out) const {
-    float sum = 0;
-    for (const Rgb& d : depth_) *out++ = sum += d[channel];
-  }
-
- private:
-  float intervals() const { return static_cast<float>(depth_.size()) - 1; }
-  float radius(int m) const { return view_.first + (view_.last - view_.first) * square(static_cast<float>(m) / intervals()); }
-  float placeOf(float t) const {
-    return intervals() * std::sqrt(std::max(0.f, t - view_.first) / (view_.last - view_.first));
-  }
-
-  const DepthView& view_;
-  std::vector<Rgb> depth_;
 };
 
 }  // namespace
@@ -153,16 +107,18 @@ void MediaBetween::fillRow(const Scene& scene, size_t i, int row) {
   const auto side = static_cast<size_t>(options_.side), radii = static_cast<size_t>(options_.radii);
   float* table = &depth_[i * static_cast<size_t>(channels_) * sizeOfTable() + static_cast<size_t>(row) * side * radii];
   const int steps = options_.radii * 4 / 3;
+  const std::vector<float> distances = radiiOf(views_[i], options_.radii);
+  MarchedDepth way;
   for (int column = 0; column < options_.side; ++column, table += radii) {
     MediaRay r{{points_[i], nodeDirection(views_[i], options_.side, column, row)}, media, 0};
-    TableRay way(views_[i], options_.radii);
+    way.clear();
     walkMedia(view, rays, r, views_[i].last, [&](float t0, float t1) {
       return marchMedia(view, r.media, r.ray, t0, t1, steps, 0, [&](float a, float b, Rgb depth) {
         way.add(a, b, depth);
         return true;
       });
     });
-    for (int c = 0; c < channels_; ++c) way.write(c, table + static_cast<size_t>(c) * sizeOfTable());
+    for (int c = 0; c < channels_; ++c) way.write(distances, c, table + static_cast<size_t>(c) * sizeOfTable());
   }
 }
 
