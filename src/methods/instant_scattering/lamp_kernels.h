@@ -19,7 +19,7 @@ struct LampPoint {
   float nx = 0, ny = 0, nz = 0;  ///< normal; 0 where it sends to all sides alike
   float all = 0;                 ///< 1 where it does, otherwise 0
   float r = 0, g = 0, b = 0;     ///< intensity along the normal, over how many points there are [W/sr]
-  float area = 0;                ///< for which it stands [unit^2]; 0 of a lamp without one
+  float area = 0;                ///< of the whole lamp [unit^2]; 0 if it has none
 };
 
 struct LampPoints {

@@ -4,8 +4,8 @@
 namespace virga {
 namespace {
 
-/// A surface that is nearer to an area lamp's point than this many edges of the area for which it stands is lit by solid
-/// angle instead.
+/// A surface that is nearer to an area lamp than this many of its edges (roots of its area) is lit by solid angle
+/// instead.
 constexpr float kNearLamp = 2;
 
 Rgb intensityOf(const LampPoint& lamp) { return {lamp.r, lamp.g, lamp.b}; }
@@ -60,7 +60,7 @@ bool LampPackets::isFog(const MarchedEye& eye) const {
 bool LampPackets::isLitByPackets(const MarchedEye& eye) const {
   if (!lamps_.alone() || eye.side.bsdf->kind() != Bsdf::Kind::diffuse) return false;
   for (const LampPoint& lamp : lamps_.points().point)
-    if (lengthSquared(placeOf(lamp) - eye.point.p) < square(kNearLamp) * lamp.area * LampPoints::kCount) return false;
+    if (lengthSquared(placeOf(lamp) - eye.point.p) < square(kNearLamp) * lamp.area) return false;
   return true;
 }
 
