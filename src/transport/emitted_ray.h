@@ -46,8 +46,8 @@ VIRGA_HD inline EmittedRay fromInfinity(const SceneView& scene, Vec3 travel, Rgb
 /// Where a light at a finite distance sends its rays from.
 struct EmissionPlace {
   Vec3 p;
-  Vec3 normal;      ///< of an area light
-  Rgb scale;        ///< area light: radiance over the density of the place; otherwise 1
+  Vec3 normal;       ///< of an area light
+  Rgb scale;         ///< area light: radiance over the density of the place; otherwise 1
   float height = 0;  ///< spot: 1 - cosine of its half angle
 
   VIRGA_HD Vec3 sample(const EmitterView& emitter, Vec2 u) const {
@@ -100,8 +100,8 @@ VIRGA_HD inline EmittedRay sampleDirection(const EmitterView& emitter, const Emi
   return {{place.p, w}, place.flux(emitter, w) * (own / mixture)};
 }
 
-/// Samples where and whither `emitter` sends light; the choice of the emitter is not counted. Black where a ray was aimed
-/// at the target from where no light goes to it.
+/// Samples where and whither `emitter` sends light; the choice of the emitter is not counted. Black where a ray was
+/// aimed at the target from where no light goes to it.
 VIRGA_HD inline EmittedRay sampleEmittedRay(const SceneView& scene, const EmitterView& emitter, Vec2 uPosition,
                                             Vec2 uDirection, const EmissionTarget& target = {}) {
   if (!emitter.infinite())

@@ -30,8 +30,8 @@ class FrameRenderer {
 
   std::unique_ptr<FrameLights> lights_;
   std::unique_ptr<FrameLamps> lamps_;  ///< there where lights_ are
-  uint32_t lightsOf_ = 0;  ///< the pass that they belong to
-  int around_ = 0;         ///< the medium that had no end when they were made
+  uint32_t lightsOf_ = 0;              ///< the pass that they belong to
+  int around_ = 0;                     ///< the medium that had no end when they were made
 };
 
 }  // namespace virga

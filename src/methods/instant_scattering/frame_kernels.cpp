@@ -82,8 +82,7 @@ void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scal
               float (*value)[RayPacket::kSize], RayPacket& rays) {
   kernels::lampInFog(lamp, fog, place, at, value);
   alignas(64) float most[RayPacket::kSize];
-  for (int i = 0; i < RayPacket::kSize; ++i)
-    most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
+  for (int i = 0; i < RayPacket::kSize; ++i) most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
   aimFromMedia(lamp, at, most, scale, rays);
 }
 

@@ -3,9 +3,9 @@
 
 #include <stop_token>
 
+#include "methods/instant_scattering/lamp_kernels.h"
 #include "methods/instant_scattering/marched_light.h"
 #include "methods/instant_scattering/media_between.h"
-#include "methods/instant_scattering/lamp_kernels.h"
 
 namespace virga {
 

@@ -144,8 +144,8 @@ void FrameLights::lookFrom(size_t i, const KernelReceivers& to, EndKind kind, fl
   const KernelLight& light = lights_[i].kernel;
   between_.look(i, to, seen);
   if (maps_.empty()) return;
-  const KernelShadowMap map{&maps_[i * texelsOfMap()], mapSide_, ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_),
-                            ShadowMapsView::kLeastCosine};
+  const KernelShadowMap map{&maps_[i * texelsOfMap()], mapSide_,
+                            ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_), ShadowMapsView::kLeastCosine};
   lookThroughMap(light, to, kind, map, seen[0]);
   for (int c = 1; c < 3; ++c)
     if (seen[c] != seen[0]) lookThroughMap(light, to, kind, map, seen[c]);

@@ -53,8 +53,8 @@ class FrameLights {
   VirtualLights virtualLights_;
   std::vector<Light> lights_;
   MediaBetween between_;
-  std::vector<float> maps_;       ///< shadow maps of the lights; empty: there are none
-  int mapSide_ = 0;               ///< texels of a map in either direction
+  std::vector<float> maps_;  ///< shadow maps of the lights; empty: there are none
+  int mapSide_ = 0;          ///< texels of a map in either direction
 };
 
 /// How the kernels know a phase function, and its g; false if they do not.

@@ -35,8 +35,8 @@ class FramePixels {
     std::array<Pixel, kSize> pixels;
     size_t count = 0;
     std::vector<MarchedEye> eyes = std::vector<MarchedEye>(kSize);  ///< room for them
-    std::array<PixelFeatures, kSize> features;                     ///< what is seen
-    std::array<LayerRadiance, kSize> radiance;                     ///< light of x1 straight from lamps
+    std::array<PixelFeatures, kSize> features;                      ///< what is seen
+    std::array<LayerRadiance, kSize> radiance;                      ///< light of x1 straight from lamps
   };
   /// Fills eyes, features and radiance. No light is found where an eye is not plain: where a mirror, glass or a narrow
   /// bsdf is seen.

@@ -116,7 +116,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
                 {{}, "ask for more passes instead: each has walks of its own", {}});
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.aim = reader.share("aim").value_or(o.mode == ImsOptions::Mode::frame ? kFrameAim : 0);
-  if (o.aim > kMostAim) throw Error(fmt::format("--set ims.aim may be at most {}: some walks must go elsewhere", kMostAim));
+  if (o.aim > kMostAim)
+    throw Error(fmt::format("--set ims.aim may be at most {}: some walks must go elsewhere", kMostAim));
   o.retrace = reader.share("retrace").value_or(o.retrace);
   if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
     throw Error("--set ims.retrace needs ims.mode=exact or fast: a frame traces its walks when the scene changes");

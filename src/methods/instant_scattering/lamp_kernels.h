@@ -118,8 +118,7 @@ VIRGA_HD static inline void lampInFog(const LampPoint& lamp, const FogRays& ray,
     const float in = std::fmin(std::fmax(along, 0.f), whole);
     const float from = start + in, d2 = height * height + from * from, inverse = 1 / std::sqrt(d2);
     // 1 / d^2 and the density height / (range d^2) cancel.
-    const float cosine =
-        lampCosine(lamp, ray.dx[i] * from - ex, ray.dy[i] * from - ey, ray.dz[i] * from - ez, inverse);
+    const float cosine = lampCosine(lamp, ray.dx[i] * from - ex, ray.dy[i] * from - ey, ray.dz[i] * from - ez, inverse);
     const float g = ray.anisotropy[i], toward = from * inverse;  // dot(wo, wi): wo = -d, wi = (y - p) / |y - p|
     const float q = 1 + g * g + 2 * g * toward;
     const float light = kInverse4Pi * (1 - g * g) / (q * std::sqrt(q)) * cosine * range / height;

@@ -192,8 +192,7 @@ void LampPackets::lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRa
     virga::lightMedia(lamp, places[n], scene_.scale, value, rays);
     for (size_t i = 0; i < kSize; ++i)
       if (!points[n][i].media) value[i] = rays.tMax[i] = 0;
-    const Seen seen =
-        see(k, places[n], rays, [&](int i) { return MediaRay{rayOf(rays, i), *points[n][i].media, 0}; });
+    const Seen seen = see(k, places[n], rays, [&](int i) { return MediaRay{rayOf(rays, i), *points[n][i].media, 0}; });
     for (size_t i = 0; i < eyes.size(); ++i) {
       if (!(value[i] > 0)) continue;
       const Ray ray = rayOf(rays, static_cast<int>(i));

@@ -149,8 +149,8 @@ class MarchedLight {
       const Vec2 uv = lightUv(shape, emitter, eye.point.p, eye.hit.primitive, {eye.hit.u, eye.hit.v});
       radiance.add(Layer::emission, transmittanceOf(eye.depth) * emitter.radianceAt(uv));
     } else if (scene_.environment >= 0) {
-      radiance.add(Layer::emission, transmittanceOf(eye.depth) *
-                                        environmentRadiance(scene_.emitters[scene_.environment], eye.at.ray.d));
+      radiance.add(Layer::emission,
+                   transmittanceOf(eye.depth) * environmentRadiance(scene_.emitters[scene_.environment], eye.at.ray.d));
     }
   }
 

@@ -35,7 +35,8 @@ DepthView viewOf(const Bounds& media, Vec3 p) {
 std::vector<float> radiiOf(const DepthView& view, int count) {
   std::vector<float> radii;
   for (int m = 0; m < count; ++m)
-    radii.push_back(view.first + (view.last - view.first) * square(static_cast<float>(m) / static_cast<float>(count - 1)));
+    radii.push_back(view.first +
+                    (view.last - view.first) * square(static_cast<float>(m) / static_cast<float>(count - 1)));
   return radii;
 }
 
@@ -135,8 +136,8 @@ void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) con
       std::fill_n(seen[c], to.count, 1.f);
     const size_t table = i * static_cast<size_t>(channels_) + static_cast<size_t>(c);
     if (kind_ == Kind::tables)
-      lookThroughTable({p.x, p.y, p.z}, to,
-                       {&depth_[table * sizeOfTable()], options_.side, options_.radii, views_[i]}, seen[c]);
+      lookThroughTable({p.x, p.y, p.z}, to, {&depth_[table * sizeOfTable()], options_.side, options_.radii, views_[i]},
+                       seen[c]);
   }
 }
 

@@ -107,8 +107,8 @@ class Upsampling {
 
   std::vector<PixelFeatures> features_;
   int width_, height_, spacing_;
-  int columns_, rows_;            ///< of coarse pixels
-  int blocksPerCell_;             ///< in either direction
+  int columns_, rows_;  ///< of coarse pixels
+  int blocksPerCell_;   ///< in either direction
   int blocksAcross_, blocksDown_;
   std::vector<std::array<float, 4>> splines_;  ///< at each place between two coarse columns
   std::vector<Pixel> computed_;

@@ -25,7 +25,7 @@ struct UpsamplingBlock {
   static constexpr int kTaps = 16, kEdge = 8, kPixels = kEdge * kEdge;
   using Lanes = float[kPixels];
 
-  int count = 0;  ///< of pixels, rounded up to whole vectors
+  int count = 0;                                                         ///< of pixels, rounded up to whole vectors
   alignas(64) Lanes px, py, pz, nx, ny, nz, depth, mediaDepth, opacity;  ///< as of a tap
   alignas(64) Lanes wx[4], wy[4];                                        ///< weights of the taps' columns and rows
   alignas(64) Lanes surfaceVeil[3], mediaVeil[3];
@@ -77,8 +77,7 @@ VIRGA_HD static inline void addScaled(int count, float* __restrict sum, const fl
 VIRGA_HD static inline void unveil(int count, float* __restrict light, const float* __restrict own,
                                    const float* __restrict through) {
 #pragma omp simd
-  for (int i = 0; i < count; ++i)
-    light[i] = through[i] > 1e-30f ? light[i] * own[i] / through[i] : 0.f;
+  for (int i = 0; i < count; ++i) light[i] = through[i] > 1e-30f ? light[i] * own[i] / through[i] : 0.f;
 }
 
 }  // namespace kernels
