@@ -50,6 +50,10 @@ class FramePixels {
   template <class Visit>
   void visitReceivers(const MarchedEye& eye, Visit&& visit) const;
   CameraRay cameraRay(int x, int y) const;
+  /// Fixed numbers of receiver `receiver` of a pixel, for findNearby().
+  NearbyNumbers nearbyNumbers(Pixel p, int receiver) const;
+  /// A vertex that finds what clamping takes from a receiver; false where there is nothing.
+  bool findNearby(const Receiver& from, Pixel pixel, int number, Receiver& next) const;
 
   const Scene& scene_;
   EmbreeRays rays_;

@@ -29,7 +29,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
     {"compensation", "path; frame: spread",
      "path: eye paths go on within the radius; sampled: new vertices by restricted distances; none: clamped (biased); "
-     "frame: spread, lights are balls of that radius (biased), or none"},
+     "frame: spread, lights are balls of that radius (biased), none, or sampled: one level, reduced clamping behind it "
+     "(biased; a path may be a segment longer than max_depth)"},
     {"levels", "-1", "sampled: levels of recursion; -1: until Russian roulette ends it"},
     {"ending", "unclamped", "sampled: beyond the last level: unclamped lights, reduced clamping, nothing (biased)"},
     {"v1", "1", "sampled: new vertices at the first level (V_1)"},

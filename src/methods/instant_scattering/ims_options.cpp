@@ -95,6 +95,9 @@ void refuseIdle(const Settings& settings, bool idle, std::initializer_list<std::
 }
 
 void refuseIdle(const Settings& settings, const ImsOptions& o) {
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  refuseIdle(settings, isFrame, {"levels", "ending", "v1", "v2", "p1", "p2", "transmittance"},
+             "ims.mode=exact or fast");
   refuseIdle(settings, o.compensate != ImsOptions::Compensate::sampled,
              {"levels", "ending", "v1", "v2", "p1", "p2", "transmittance"}, "ims.compensation=sampled");
   refuseIdle(settings, o.visibility.mode != LightVisibilityOptions::Mode::shadowMap, {"map_resolution", "map_points"},
@@ -149,8 +152,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
   if (o.show != ImsOptions::Show::picture && o.mode != ImsOptions::Mode::exact)
     throw Error("--set ims.show needs ims.mode=exact: others do not tell parts of the picture apart");
-  if (isFrame && (o.compensate == ImsOptions::Compensate::path || o.compensate == ImsOptions::Compensate::sampled))
-    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread or none");
+  if (isFrame && o.compensate == ImsOptions::Compensate::path)
+    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread, sampled or none");
   if (!isFrame && o.compensate == ImsOptions::Compensate::spread)
     throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);

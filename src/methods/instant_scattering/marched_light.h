@@ -48,18 +48,19 @@ struct FixedNumbers {
     return {turned(choice, 0.4142136f), {turned(place.x, 0.7320508f), turned(place.y, 0.2360680f)}};
   }
 
- private:
-  static constexpr struct {
-    float x, y;
-  } kFour[4] = {{0.375f, 0.125f}, {0.875f, 0.875f}, {0.125f, 0.625f}, {0.625f, 0.375f}};
-
+  /// A number of pass 0 in that of this pass, which moves `by` so much from one to the next.
   VIRGA_HD float turned(float x, float by) const {
     const float y = x + by * static_cast<float>(pass % 4096u);
     return std::fmin(y - std::floor(y), 0x1.fffffep-1f);
   }
+
+ private:
+  static constexpr struct {
+    float x, y;
+  } kFour[4] = {{0.375f, 0.125f}, {0.875f, 0.875f}, {0.125f, 0.625f}, {0.625f, 0.375f}};
 };
 
-/// Fog is lit by points of these lamps, and by angle as seen from them: FogLamps.
+/// Fog is lit by points of these lamps, and by angle as seen from them: LampPackets.
 VIRGA_HD inline bool isAimedAt(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::area;
 }
