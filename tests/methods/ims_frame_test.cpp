@@ -124,6 +124,42 @@ TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
 }
 TEST(ImsFrame, GlassGoesByPaths) { expectNear(fog(16, R"(<bsdf type="dielectric"/>)"), 0.06, 16, {{"lights", "300"}}); }
 
+// Packets know point and area lamps; the sun and spots go by single rays beside them.
+TEST(ImsFrame, LampsOfAllKindsLightFogThatIsEverywhere) {
+  const std::string scene =
+      R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="0.3, 0.2, 0.1"/>
+    <float name="albedo" value="0.8"/></medium>)" +
+      pinpointSensor("0, 0.5, 3", "0, -0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)") +
+      R"(
+    <emitter type="point"><point name="position" x="1" y="1.5" z="1"/><rgb name="intensity" value="4, 5, 6"/></emitter>
+    <emitter type="spot"><transform name="to_world"><lookat origin="-1, 2, 0" target="0, -1, 0" up="0, 0, 1"/></transform>
+      <rgb name="intensity" value="9"/></emitter>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.4"/><rotate x="1" angle="90"/><translate y="2"/>
+      </transform><emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>
+    <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse"/></shape>
+    <shape type="cube"><transform name="to_world"><scale value="3"/></transform><bsdf type="twosided"><bsdf type="diffuse"/>
+      </bsdf></shape>)";
+  expectNear(scene, 0.06, 32, {{"lights", "300"}, {"walks", "1024"}}, 320);
+}
+// An area lamp over smoke: a table for each of its points.
+TEST(ImsFrame, TablesOfAnAreaLamp) {
+  std::string scene = plume(24);
+  const std::string lamp = scene.substr(scene.find("<emitter"), scene.find("</emitter>") + 10 - scene.find("<emitter"));
+  scene.replace(scene.find(lamp), lamp.size(),
+                R"(<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+    <rotate x="1" angle="90"/><translate x="-1" y="3" z="0.5"/></transform><emitter type="area"><rgb name="radiance" value="90"/>
+    </emitter></shape>)");
+  const RenderSession truth = rendered(
+      sceneOf(scene), {.passes = 480, .seed = 5, .layers = LayerMask::all(), .settings = {{"max_depth", "2"}}});
+  const RenderSession own = frames(scene, 24, {{"max_depth", "2"}});
+  for (const Layer layer : {Layer::directSurface, Layer::directMedia}) {
+    const stats::Moments a = replicateMoments(own.film(), layer), b = replicateMoments(truth.film(), layer);
+    const double noise = 4 * std::hypot(a.standardError(), b.standardError());
+    EXPECT_NEAR(a.mean(), b.mean(), 0.03 * b.mean() + noise) << kLayerNames[static_cast<size_t>(layer)];
+    EXPECT_LT(noise, 0.1 * b.mean()) << "too few samples to tell";
+  }
+}
+
 // Many walks, all of their lights, hardly spread, exact visibility: the frame goes to the truth.
 TEST(ImsFrame, ManyLightsGoToTheTruth) {
   const std::string ball = pinpointSensor("0, 0, 3", "0.1, 0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)");
