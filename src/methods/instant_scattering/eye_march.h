@@ -25,7 +25,7 @@ VIRGA_HD inline ClippedRange whereFilled(const MediumView& medium, const Ray& ra
 }
 
 /// Steps whose densities are looked up together.
-inline constexpr int kMarchedAtOnce = 65;
+inline constexpr int kMarchedAtOnce = 32;
 
 /// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
 /// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
@@ -115,7 +115,7 @@ struct MarchedEye {
     VIRGA_HD Rgb depth() const { return {own[0], own[1], own[2]}; }
   };
 
-  MediaRay at;  ///< its media are those at the surface, or at the end
+  MediaRay at;  ///< its media are those at the surface, or at the end, or where all before it is opaque
   RayHit hit;
   Rgb depth;  ///< optical depth of all of it
   int steps = 0, stretches = 0;
@@ -127,6 +127,8 @@ struct MarchedEye {
 
   bool plain = true;  ///< no mirror, glass or narrow bsdf is met, and no more stretches than can be kept
 
+  /// Nothing behind it counts: less than 1e-7 of it is seen.
+  VIRGA_HD bool opaque() const { return minComponent(depth) > 16; }
   VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
 
   /// Points in equal parts of what is seen of the media, each of them at `shift` in [0, 1) of its part:
@@ -174,10 +176,10 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
         eye.step[eye.steps++] = {
             a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
       eye.depth += here;
-      return true;
+      return !eye.opaque();
     });
     eye.stretches += kept ? 1 : 0;
-    return true;
+    return !eye.opaque();
   });
 }
 template <class Rays>

@@ -129,6 +129,7 @@ class MarchedLight {
   VIRGA_HD Rgb scatteringAt(Vec3 p, Vec3 wo, Vec3 wi, const MediaState& media) const {
     if (media.count() == 1) {
       const MediumView& medium = scene_.media[media.medium(0)];
+      if (medium.phaseBlends.size == 0) return medium.albedoAt(p) * medium.phase.value(wo, wi);
       return medium.albedoAt(p) * medium.phaseAt(p).value(wo, wi);
     }
     Rgb sigmaT, scattered;
