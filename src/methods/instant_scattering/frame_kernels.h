@@ -56,6 +56,8 @@ struct DepthView {
 
 /// Optical depths at directions and distances: nodes of an octahedral map of the stretched directions, and radii.
 struct DepthTable {
+  static constexpr int kMostSize = 1 << 24;  ///< side * side * radii stays below it
+
   const float* depth;  ///< [row][column][radius]
   int side;            ///< nodes along the map's edge; those on its border are there twice
   int radii;           ///< the first at 0
@@ -165,10 +167,12 @@ VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelRec
 /// Multiplies `seen` by the transmittance that a point's table knows.
 VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
                                              float* seen) {
-  const int side = table.side, radii = table.radii;
   const float* __restrict depth = table.depth;
+  const float* __restrict right = depth + table.radii;
+  const float* __restrict below = depth + table.radii * table.side;
+  const float* __restrict across = below + table.radii;
   const DepthView f = table.view;
-  const auto columns = static_cast<float>(side), distances = static_cast<float>(radii);
+  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
   const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
@@ -181,15 +185,16 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
     octahedral(a * turned, b * turned, c, u, v);
     u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
     const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
-    const int column = static_cast<int>(std::fmin(u, columns - 1.001f)),
-              row = static_cast<int>(std::fmin(v, columns - 1.001f)), radius = static_cast<int>(m);
-    const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row),
-                fm = m - static_cast<float>(radius);
-    const int at = (row * side + column) * radii + radius;
+    const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
+    const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
+    const auto radius = static_cast<float>(static_cast<int>(m));
+    const float fu = u - column, fv = v - row, fm = m - radius;
+    // In floats, which know all integers below 2^24: vector code multiplies them faster.
+    const int at = static_cast<int>((row * columns + column) * distances + radius);
     const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
-    const float d01 = depth[at + radii] * (1 - fm) + depth[at + radii + 1] * fm;
-    const float d10 = depth[at + radii * side] * (1 - fm) + depth[at + radii * side + 1] * fm;
-    const float d11 = depth[at + radii * (side + 1)] * (1 - fm) + depth[at + radii * (side + 1) + 1] * fm;
+    const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
+    const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
+    const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
     seen[i] *= std::exp(-((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv));
   }
 }

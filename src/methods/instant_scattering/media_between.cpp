@@ -92,6 +92,7 @@ MediaBetween::MediaBetween(const Scene& scene, std::vector<Vec3> points, const O
     kind_ = Kind::nothing;
     return;
   }
+  VIRGA_ASSERT(sizeOfTable() < DepthTable::kMostSize);
   for (const Vec3 p : points_) views_.push_back(viewOf(media, p));
   depth_.resize(points_.size() * static_cast<size_t>(channels_) * sizeOfTable());
   const auto rows = static_cast<int64_t>(points_.size()) * options_.side;
