@@ -21,6 +21,7 @@ struct RayPacket {
     dx[i] = ray.d.x, dy[i] = ray.d.y, dz[i] = ray.d.z;
     tMax[i] = end;
   }
+  Ray ray(int i) const { return {{ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}}; }
 };
 
 using PacketHits = std::array<RayHit, RayPacket::kSize>;

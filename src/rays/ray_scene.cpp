@@ -444,6 +444,11 @@ PacketHits RayScene::nearest(const RayPacket& rays) const {
   PacketHits found;
   const Partakers partakers(rays);
   if (shapes_.empty() || !partakers.any) return found;
+  if (impl_->top) {  // packets among instances may never return (Embree 3.13.5)
+    for (int i = 0; i < RayPacket::kSize; ++i)
+      if (partakers.valid[i]) found[static_cast<size_t>(i)] = nearest(rays.ray(i), 0, rays.tMax[i]);
+    return found;
+  }
   Context context;
   context.embree = coherentContext();
   RTCRayHit16 q;
@@ -461,12 +466,17 @@ PacketHits RayScene::nearest(const RayPacket& rays) const {
 uint32_t RayScene::occluded(const RayPacket& rays) const {
   const Partakers partakers(rays);
   if (shapes_.empty() || !partakers.any) return 0;
+  uint32_t met = 0;
+  if (impl_->top) {
+    for (int i = 0; i < RayPacket::kSize; ++i)
+      if (partakers.valid[i] && occluded(rays.ray(i), 0, rays.tMax[i])) met |= 1u << i;
+    return met;
+  }
   Context context;
   context.embree = coherentContext();
   RTCRay16 q;
   fill(rays, q);
   rtcOccluded16(partakers.valid, impl_->scene(), &context.embree, &q);
-  uint32_t met = 0;
   for (int i = 0; i < RayPacket::kSize; ++i)
     if (partakers.valid[i] && q.tfar[i] < 0) met |= 1u << i;
   return met;
