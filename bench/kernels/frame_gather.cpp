@@ -16,7 +16,7 @@ void plainGather(const float* const light[6], int count, float x, float y, float
 
 namespace {
 
-constexpr int kReceivers = 512, kLights = 1300;
+constexpr int kReceivers = 512, kLights = 1300, kSide = 12, kRadii = 24;
 
 std::vector<float> numbers(int count, uint64_t seed) {
   Pcg32 random(seed);
@@ -71,16 +71,17 @@ template <EndKind from, EndKind to, bool table>
 void frame(benchmark::State& state) {
   Receivers r;
   const std::vector<KernelLight> all = lights();
-  const std::vector<float> depth = numbers(DepthTable::kSize, 9);
+  const std::vector<float> depth = numbers(kSide * kSide * kRadii, 9);
   const KernelReceivers view = r.view();
   const float* const seen[3] = {r.seen.data(), r.seen.data(), r.seen.data()};
   for (auto _ : state)
     for (const KernelLight& light : all) {
       if (table) {
         std::fill(r.seen.begin(), r.seen.end(), 1.f);
-        lookThroughTable(light, view, {depth.data(), {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1.8f}}, r.seen.data());
+        lookThroughTable({light.px, light.py, light.pz}, view,
+                         {depth.data(), kSide, kRadii, {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1.8f}}, r.seen.data());
       } else {
-        lookThroughFog(light, view, 0.85f, r.seen.data());
+        lookThroughFog({light.px, light.py, light.pz}, view, 0.85f, r.seen.data());
       }
       gatherLight(light, from, view, to, seen, {NearField::Kind::spread, 25});
     }

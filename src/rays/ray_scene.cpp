@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <variant>
 
@@ -102,32 +103,46 @@ analytic::LineHit nearestOf(const analytic::LineHits& hits, float tMin, float tM
   return best;
 }
 
+Ray rayOf(RTCRayN* r, unsigned n, unsigned i) {
+  return {{RTCRayN_org_x(r, n, i), RTCRayN_org_y(r, n, i), RTCRayN_org_z(r, n, i)},
+          {RTCRayN_dir_x(r, n, i), RTCRayN_dir_y(r, n, i), RTCRayN_dir_z(r, n, i)}};
+}
+
 void intersectCallback(const RTCIntersectFunctionNArguments* args) {
-  auto* rayHit = reinterpret_cast<RTCRayHit*>(args->rayhit);
-  RTCRay& r = rayHit->ray;
-  const Vec3 o(r.org_x, r.org_y, r.org_z), d(r.dir_x, r.dir_y, r.dir_z);
-  const analytic::LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), o, d);
+  const unsigned n = args->N;
+  RTCRayN* r = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* h = RTCRayHitN_HitN(args->rayhit, n);
   auto* context = reinterpret_cast<Context*>(args->context);
-  if (context->list) {
-    for (int i = 0; i < hits.count; ++i)
-      if (hits.hit[i].t >= r.tnear && hits.hit[i].t <= r.tfar)
-        context->list->insert({hits.hit[i].t, context->shape(args->geomID), hits.hit[i].entering});
-    return;
+  for (unsigned i = 0; i < n; ++i) {
+    if (!args->valid[i]) continue;
+    const Ray ray = rayOf(r, n, i);
+    const float tMin = RTCRayN_tnear(r, n, i), tMax = RTCRayN_tfar(r, n, i);
+    const analytic::LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), ray.o, ray.d);
+    if (context->list) {
+      for (int k = 0; k < hits.count; ++k)
+        if (hits.hit[k].t >= tMin && hits.hit[k].t <= tMax)
+          context->list->insert({hits.hit[k].t, context->shape(args->geomID), hits.hit[k].entering});
+      continue;
+    }
+    const analytic::LineHit nearest = nearestOf(hits, tMin, tMax);
+    if (nearest.t == kInfinity) continue;
+    RTCRayN_tfar(r, n, i) = nearest.t;
+    RTCHitN_geomID(h, n, i) = args->geomID;
+    RTCHitN_instID(h, n, i, 0) = args->context->instID[0];
+    RTCHitN_primID(h, n, i) = args->primID;
+    RTCHitN_u(h, n, i) = RTCHitN_v(h, n, i) = 0;
   }
-  const analytic::LineHit nearest = nearestOf(hits, r.tnear, r.tfar);
-  if (nearest.t == kInfinity) return;
-  r.tfar = nearest.t;
-  rayHit->hit.geomID = args->geomID;
-  rayHit->hit.instID[0] = args->context->instID[0];
-  rayHit->hit.primID = args->primID;
-  rayHit->hit.u = rayHit->hit.v = 0;
 }
 
 void occludedCallback(const RTCOccludedFunctionNArguments* args) {
-  auto* r = reinterpret_cast<RTCRay*>(args->ray);
-  const Vec3 o(r->org_x, r->org_y, r->org_z), d(r->dir_x, r->dir_y, r->dir_z);
-  if (nearestOf(intersectAnalytic(implOf(args->geometryUserPtr), o, d), r->tnear, r->tfar).t < kInfinity)
-    r->tfar = -kInfinity;
+  RTCRayN* r = args->ray;
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (!args->valid[i]) continue;
+    const Ray ray = rayOf(r, args->N, i);
+    const analytic::LineHits hits = intersectAnalytic(implOf(args->geometryUserPtr), ray.o, ray.d);
+    float& tMax = RTCRayN_tfar(r, args->N, i);
+    if (nearestOf(hits, RTCRayN_tnear(r, args->N, i), tMax).t < kInfinity) tMax = -kInfinity;
+  }
 }
 
 // Are the barycentric weights of a hit so small that the ray may have missed (or met) the triangle by rounding alone?
@@ -362,6 +377,13 @@ RayScene::RayScene(Shapes shapes, const RayScene* previous)
 
 int RayScene::movedShapes() const { return static_cast<int>(impl_->moved.size()); }
 
+Bounds RayScene::bounds() const {
+  if (shapes_.empty()) return {};
+  RTCBounds b;
+  rtcGetSceneBounds(impl_->scene(), &b);
+  return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}};
+}
+
 bool RayScene::sharesStandingShapes(const RayScene& other) const { return impl_->standing == other.impl_->standing; }
 
 RayScene::~RayScene() = default;
@@ -386,6 +408,78 @@ bool RayScene::occluded(const Ray& ray, float tMin, float tMax) const {
   RTCRay q{ray.o.x, ray.o.y, ray.o.z, tMin, ray.d.x, ray.d.y, ray.d.z, 0, tMax, ~0u, 0, 0};
   rtcOccluded1(impl_->scene(), &context.embree, &q);
   return q.tfar < 0;
+}
+
+namespace {
+
+RTCIntersectContext coherentContext() {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  return context;
+}
+
+/// Which rays take part, as Embree takes it.
+struct alignas(64) Partakers {
+  int valid[RayPacket::kSize];
+  bool any = false;
+
+  explicit Partakers(const RayPacket& rays) {
+    for (int i = 0; i < RayPacket::kSize; ++i) valid[i] = rays.tMax[i] > 0 ? -1 : 0, any |= rays.tMax[i] > 0;
+  }
+};
+
+void fill(const RayPacket& rays, RTCRay16& r) {
+  constexpr size_t kBytes = sizeof(rays.ox);
+  std::memcpy(r.org_x, rays.ox, kBytes), std::memcpy(r.org_y, rays.oy, kBytes), std::memcpy(r.org_z, rays.oz, kBytes);
+  std::memcpy(r.dir_x, rays.dx, kBytes), std::memcpy(r.dir_y, rays.dy, kBytes), std::memcpy(r.dir_z, rays.dz, kBytes);
+  std::memcpy(r.tfar, rays.tMax, kBytes);
+  std::memset(r.tnear, 0, kBytes), std::memset(r.time, 0, kBytes);
+  std::memset(r.mask, 0xff, kBytes), std::memset(r.id, 0, kBytes), std::memset(r.flags, 0, kBytes);
+}
+
+}  // namespace
+
+PacketHits RayScene::nearest(const RayPacket& rays) const {
+  PacketHits found;
+  const Partakers partakers(rays);
+  if (shapes_.empty() || !partakers.any) return found;
+  if (impl_->top) {  // packets among instances may never return (Embree 3.13.5)
+    for (int i = 0; i < RayPacket::kSize; ++i)
+      if (partakers.valid[i]) found[static_cast<size_t>(i)] = nearest(rays.ray(i), 0, rays.tMax[i]);
+    return found;
+  }
+  Context context;
+  context.embree = coherentContext();
+  RTCRayHit16 q;
+  fill(rays, q.ray);
+  std::memset(q.hit.geomID, 0xff, sizeof(q.hit.geomID));  // RTC_INVALID_GEOMETRY_ID
+  std::memset(q.hit.instID, 0xff, sizeof(q.hit.instID));
+  rtcIntersect16(partakers.valid, impl_->scene(), &context.embree, &q);
+  for (size_t i = 0; i < found.size(); ++i)
+    if (partakers.valid[i] && q.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID)
+      found[i] = {q.ray.tfar[i], impl_->numbers.of(q.hit.instID[0][i], q.hit.geomID[i]), q.hit.primID[i], q.hit.u[i],
+                  q.hit.v[i]};
+  return found;
+}
+
+uint32_t RayScene::occluded(const RayPacket& rays) const {
+  const Partakers partakers(rays);
+  if (shapes_.empty() || !partakers.any) return 0;
+  uint32_t met = 0;
+  if (impl_->top) {
+    for (int i = 0; i < RayPacket::kSize; ++i)
+      if (partakers.valid[i] && occluded(rays.ray(i), 0, rays.tMax[i])) met |= 1u << i;
+    return met;
+  }
+  Context context;
+  context.embree = coherentContext();
+  RTCRay16 q;
+  fill(rays, q);
+  rtcOccluded16(partakers.valid, impl_->scene(), &context.embree, &q);
+  for (int i = 0; i < RayPacket::kSize; ++i)
+    if (partakers.valid[i] && q.tfar[i] < 0) met |= 1u << i;
+  return met;
 }
 
 float RayScene::clearance(Vec3 p, std::span<const Vec3> sides) const {

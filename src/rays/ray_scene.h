@@ -10,6 +10,7 @@
 #include "core/transform.h"
 #include "core/vec.h"
 #include "rays/ray_hit.h"
+#include "rays/ray_packet.h"
 
 namespace virga {
 
@@ -50,12 +51,18 @@ class RayScene {
   const Shapes& shapes() const { return shapes_; }
   /// How many shapes are sorted by themselves.
   int movedShapes() const;
+  /// Of all shapes.
+  Bounds bounds() const;
   /// Do both have their standing shapes in one and the same structure?
   bool sharesStandingShapes(const RayScene& other) const;
   /// Nearest hit with tMin < t < tMax.
   RayHit nearest(const Ray& ray, float tMin, float tMax) const;
   /// Anything with tMin < t < tMax?
   bool occluded(const Ray& ray, float tMin, float tMax) const;
+  /// nearest() of each ray of a packet; nothing is found for those that take no part.
+  PacketHits nearest(const RayPacket& rays) const;
+  /// Bit i: something lies within the range of ray i.
+  uint32_t occluded(const RayPacket& rays) const;
   /// A lower bound of the distance from p to any shape, infinity where there is none: for triangles, spheres and disks
   /// the distance itself, within its rounding. Shapes that nowhere rise above a plane through p with one of the unit
   /// `sides` as its normal (beyond the errors of coordinates) do not count; without sides, all do.

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
-#include "transport/emitted_ray.h"
+#include "transport/media_bounds.h"
 
 namespace virga {
 
@@ -62,7 +62,8 @@ VirtualLights joined(const std::vector<VirtualLights>& parts) {
   return all;
 }
 
-WalkStarts::WalkStarts(const Scene& scene) : scene_(scene), endless_(endlessMedium(scene)) {}
+WalkStarts::WalkStarts(const Scene& scene, const EmissionTarget& target)
+    : scene_(scene), target_(target), endless_(endlessMedium(scene)) {}
 
 WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const SceneView& view = scene_.view;
@@ -70,7 +71,7 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const auto choice = view.emitterChoice.sample(sampler.next1D());
   const EmitterView& emitter = view.emitters[choice.index];
   const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();
-  const EmittedRay emitted = sampleEmittedRay(view, emitter, uPosition, uDirection);
+  const EmittedRay emitted = sampleEmittedRay(view, emitter, uPosition, uDirection, target_);
   if (isBlack(emitted.flux)) return {};
   const Start start{{emitted.ray, mediaAt(scene_, emitted.ray.o, endless_), 0}, emitted.flux / choice.probability};
   // Light from infinity does not get through fog that has no end.
@@ -78,10 +79,22 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   return start;
 }
 
+namespace {
+
+/// The sphere around the media; none where they are everywhere.
+EmissionTarget targetOf(const Scene& scene, float share) {
+  if (!(share > 0) || !scene.view.cameraMedia.vacuum()) return {};
+  const Bounds media = boundsOfMedia(scene);
+  const float radius = media.empty() ? 0 : 0.5f * length(media.extent());
+  return radius > 0 ? EmissionTarget{media.center(), radius, share} : EmissionTarget{};
+}
+
+}  // namespace
+
 VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
                                  const std::stop_token& stop) {
   const int blocks = (options.walks + kBlock - 1) / kBlock;
-  const WalkStarts starts(scene);
+  const WalkStarts starts(scene, targetOf(scene, options.aimed));
   std::vector<VirtualLights> parts(static_cast<size_t>(blocks));
   parallelFor(blocks, 1, [&](int64_t b) {
     if (stop.stop_requested()) return;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "scene/scene.h"
+#include "transport/emitted_ray.h"
 #include "transport/light_walk.h"
 
 namespace virga {
@@ -33,6 +34,7 @@ struct WalkOptions {
   int walks = 1024;
   int maxDepth = -1;  ///< scattering events; -1: no limit
   FlightMode flights = FlightMode::tracking;
+  float aimed = 0;  ///< in [0, 1): the share of walks that start toward the media, if these do not fill the scene
 };
 
 /// Walks number 0, 1, ... of a scene, the same for every number of threads. `id` names the set: its stream is not used,
@@ -49,7 +51,8 @@ int endlessMedium(const Scene& scene);
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
 class WalkStarts {
  public:
-  explicit WalkStarts(const Scene& scene);
+  /// `target`: where some of the walks are aimed.
+  explicit WalkStarts(const Scene& scene, const EmissionTarget& target = {});
 
   struct Start {
     MediaRay at;
@@ -61,6 +64,7 @@ class WalkStarts {
 
  private:
   const Scene& scene_;
+  EmissionTarget target_;
   int endless_;
 };
 

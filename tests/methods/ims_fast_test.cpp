@@ -97,10 +97,23 @@ std::vector<PixelFeatures> twoFloors(int width, int height) {
   return features;
 }
 
-TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
+/// The light of all pixels, row by row.
+std::vector<Upsampling::Light> spread(const Upsampling& upsampling, const std::vector<Upsampling::Light>& computed,
+                                      int width, int height) {
+  std::vector<Upsampling::Light> all(static_cast<size_t>(width * height));
+  std::vector<int> visits(all.size());
+  upsampling.spread(computed, {}, [&](int x, int y, const Upsampling::Light& light) {
+    all[static_cast<size_t>(y * width + x)] = light;
+    ++visits[static_cast<size_t>(y * width + x)];
+  });
+  EXPECT_EQ(std::count(visits.begin(), visits.end(), 1), width * height) << "each pixel once";
+  return all;
+}
+
+void expectEvenLightStaysSo(int spacing) {
   const int width = 50, height = 37;
   const auto features = twoFloors(width, height);
-  const Upsampling upsampling(features, width, height, 8);
+  const Upsampling upsampling(features, width, height, spacing);
   const auto at = [&](int x, int y) -> const PixelFeatures& { return features[static_cast<size_t>(y * width + x)]; };
   std::vector<Upsampling::Light> light;
   for (const auto& p : upsampling.computed()) {
@@ -108,10 +121,11 @@ TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
     const float side = p.x < width / 2 ? 1.f : 5.f;
     light.push_back({{f.surface * side, f.surface * (2 * side)}, {f.opacity * 3, f.opacity * 4}});
   }
+  const auto all = spread(upsampling, light, width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const float side = x < width / 2 ? 1.f : 5.f;
-      const Upsampling::Light found = upsampling.at(light, x, y);
+      const Upsampling::Light& found = all[static_cast<size_t>(y * width + x)];
       for (int c = 0; c < 3; ++c) {
         ASSERT_NEAR(found.surface[0][c], at(x, y).surface[c] * side, 1e-4f) << x << " " << y << ": leaks over the edge";
         ASSERT_NEAR(found.surface[1][c], at(x, y).surface[c] * side * 2, 2e-4f);
@@ -119,6 +133,10 @@ TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
         ASSERT_NEAR(found.media[1][c], at(x, y).opacity[c] * 4, 1e-4f);
       }
     }
+}
+
+TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
+  for (const int spacing : {1, 3, 8, 20}) expectEvenLightStaysSo(spacing);
 }
 
 TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
@@ -135,14 +153,14 @@ TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
   EXPECT_EQ(upsampling.computed()[coarse + 1].x, 30);
   std::vector<Upsampling::Light> light(coarse + 2);
   light[coarse + 1].media[0] = Rgb(7.f);
-  EXPECT_EQ(upsampling.at(light, 30, 20).media[0].r, 7.f);
+  EXPECT_EQ(spread(upsampling, light, width, height)[20 * width + 30].media[0].r, 7.f);
 }
 
 TEST(Upsampling, OnePixelIsAPicture) {
   const Upsampling upsampling(twoFloors(1, 1), 1, 1, 8);
   ASSERT_EQ(upsampling.computed().size(), 1u);
   const std::vector<Upsampling::Light> light{{{Rgb(1.f), Rgb(2.f)}, {Rgb(3.f), Rgb(4.f)}}};
-  EXPECT_NEAR(upsampling.at(light, 0, 0).media[1].g, 4, 1e-5f);
+  EXPECT_NEAR(spread(upsampling, light, 1, 1)[0].media[1].g, 4, 1e-5f);
 }
 
 TEST(PixelFeatures, OfFogBeforeAWall) {

@@ -6,7 +6,7 @@
 
 #include "methods/ims_scenes.h"
 #include "methods/instant_scattering/frame_lights.h"
-#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/lamp_packets.h"
 #include "methods/rendering.h"
 #include "volume/grid.h"
 #include "volume/lookup_along.h"
@@ -124,6 +124,42 @@ TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
 }
 TEST(ImsFrame, GlassGoesByPaths) { expectNear(fog(16, R"(<bsdf type="dielectric"/>)"), 0.06, 16, {{"lights", "300"}}); }
 
+// Packets know point and area lamps; the sun and spots go by single rays beside them.
+TEST(ImsFrame, LampsOfAllKindsLightFogThatIsEverywhere) {
+  const std::string scene =
+      R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="0.3, 0.2, 0.1"/>
+    <float name="albedo" value="0.8"/></medium>)" +
+      pinpointSensor("0, 0.5, 3", "0, -0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)") +
+      R"(
+    <emitter type="point"><point name="position" x="1" y="1.5" z="1"/><rgb name="intensity" value="4, 5, 6"/></emitter>
+    <emitter type="spot"><transform name="to_world"><lookat origin="-1, 2, 0" target="0, -1, 0" up="0, 0, 1"/></transform>
+      <rgb name="intensity" value="9"/></emitter>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.4"/><rotate x="1" angle="90"/><translate y="2"/>
+      </transform><emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>
+    <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="diffuse"/></shape>
+    <shape type="cube"><transform name="to_world"><scale value="3"/></transform><bsdf type="twosided"><bsdf type="diffuse"/>
+      </bsdf></shape>)";
+  expectNear(scene, 0.06, 32, {{"lights", "300"}, {"walks", "1024"}}, 320);
+}
+// An area lamp over smoke: a table for each of its points.
+TEST(ImsFrame, TablesOfAnAreaLamp) {
+  std::string scene = plume(24);
+  const std::string lamp = scene.substr(scene.find("<emitter"), scene.find("</emitter>") + 10 - scene.find("<emitter"));
+  scene.replace(scene.find(lamp), lamp.size(),
+                R"(<shape type="rectangle"><transform name="to_world"><scale value="0.3"/>
+    <rotate x="1" angle="90"/><translate x="-1" y="3" z="0.5"/></transform><emitter type="area"><rgb name="radiance" value="90"/>
+    </emitter></shape>)");
+  const RenderSession truth = rendered(
+      sceneOf(scene), {.passes = 480, .seed = 5, .layers = LayerMask::all(), .settings = {{"max_depth", "2"}}});
+  const RenderSession own = frames(scene, 24, {{"max_depth", "2"}});
+  for (const Layer layer : {Layer::directSurface, Layer::directMedia}) {
+    const stats::Moments a = replicateMoments(own.film(), layer), b = replicateMoments(truth.film(), layer);
+    const double noise = 4 * std::hypot(a.standardError(), b.standardError());
+    EXPECT_NEAR(a.mean(), b.mean(), 0.03 * b.mean() + noise) << kLayerNames[static_cast<size_t>(layer)];
+    EXPECT_LT(noise, 0.1 * b.mean()) << "too few samples to tell";
+  }
+}
+
 // Many walks, all of their lights, hardly spread, exact visibility: the frame goes to the truth.
 TEST(ImsFrame, ManyLightsGoToTheTruth) {
   const std::string ball = pinpointSensor("0, 0, 3", "0.1, 0.2, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)");
@@ -144,6 +180,27 @@ TEST(ImsFrame, ManyLightsGoToTheTruth) {
              1500);
 }
 
+// One level of compensation finds most of what clamping takes; without it, a good part is missing.
+TEST(ImsFrame, ALevelOfCompensationFindsWhatClampingTakes) {
+  const std::string scene = fog(24);
+  const SettingValues few{{"lights", "300"}};
+  const auto level = [&](const std::string& compensation) {
+    SettingValues settings = few;
+    settings["compensation"] = compensation;
+    return pixelMoments(indirect(frames(scene, 4, settings))).mean();
+  };
+  const RenderSession truth = rendered(sceneOf(scene), {.passes = 160, .seed = 5, .layers = LayerMask::all()});
+  const double all = pixelMoments(indirect(truth)).mean(), clamped = level("none"), found = level("sampled");
+  EXPECT_LT(clamped, 0.9 * all) << "the test cannot tell";
+  EXPECT_NEAR(found, all, 0.4 * (all - clamped));
+}
+TEST(ImsFrame, CompensationIsCoherentToo) {
+  const SettingValues compensated{{"compensation", "sampled"}};
+  const std::vector<double> same =
+      changes(indirect(frames(plume(48), 1, compensated)), indirect(frames(plume(48, 0.002f), 1, compensated)));
+  EXPECT_LT(same[same.size() * 9 / 10], 0.005);
+}
+
 TEST(ImsFrame, PathsOfOneSegmentShowLampsAlone) {
   EXPECT_EQ(pixelMoments(frames(plume(16), 1, {{"max_depth", "1"}}).film().beauty()).mean(), 0);
 }
@@ -154,8 +211,9 @@ TEST(ImsFrame, PathsOfTwoSegmentsAreDirectLight) {
 }
 
 TEST(ImsFrame, RefusesWhatItCannotDo) {
-  for (const char* compensation : {"path", "sampled"})
-    EXPECT_THROW(frames(fog(8), 1, {{"compensation", compensation}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"compensation", "path"}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"compensation", "sampled"}, {"levels", "2"}}), Error);
+  EXPECT_THROW(frames(fog(8), 1, {{"aim", "1"}}), Error);
   EXPECT_THROW(frames(fog(8), 1, {{"mode", "exact"}, {"compensation", "spread"}}), Error);
   EXPECT_THROW(frames(fog(8), 1, {{"visibility", "minimum_depth"}}), Error);
   EXPECT_THROW(frames(fog(8), 1, {{"show", "lost"}}), Error);
@@ -186,12 +244,12 @@ TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
 }
 
 TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
-  FogLamps lamps;
-  for (int k = 0; k < FogLamps::kCount; ++k) {
-    lamps.known[k] = true, lamps.px[k] = 0.3f, lamps.py[k] = 0.5f, lamps.pz[k] = -2;
-    lamps.all[k] = 1, lamps.r[k] = lamps.g[k] = lamps.b[k] = 1.f / FogLamps::kCount;
-  }
-  const FogRay ray{0, 0, 0, 0, 0, -1, 0.5f, 4, {0.4f, 0.8f, 0}, 0.3f};
+  LampPoint lamp;
+  lamp.known = true, lamp.px = 0.3f, lamp.py = 0.5f, lamp.pz = -2;
+  lamp.all = 1;
+  FogRays fog{};  // the others are not there
+  fog.dz[3] = -1, fog.t0[3] = 0.5f, fog.t1[3] = 4;
+  fog.sigmaT[0][3] = 0.4f, fog.sigmaT[1][3] = 0.8f, fog.anisotropy[3] = 0.3f;
   double truth = 0;
   const int n = 200000;
   for (int i = 0; i < n; ++i) {
@@ -199,13 +257,18 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
     const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
     truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
   }
-  float t[FogLamps::kCount], r[FogLamps::kCount], g[FogLamps::kCount], b[FogLamps::kCount];
-  constexpr int kShifts = 16;
+  KernelPlaces at;
+  RayPacket rays;
+  float value[3][RayPacket::kSize];
+  constexpr int kShifts = 64;
   double sum = 0;
   for (int shift = 0; shift < kShifts; ++shift) {
-    lightFog(lamps, ray, (static_cast<float>(shift) + 0.5f) / kShifts, t, r, g, b);
-    for (const float v : r) sum += static_cast<double>(v) / kShifts;
-    EXPECT_NEAR(b[0], 0, 0);
+    lightFog(lamp, fog, (static_cast<float>(shift) + 0.5f) / kShifts, 5, at, value, rays);
+    sum += static_cast<double>(value[0][3]) / kShifts;
+    EXPECT_EQ(value[2][3], 0);
+    EXPECT_EQ(value[0][0], 0);
+    EXPECT_GT(rays.tMax[3], 0);
+    EXPECT_EQ(rays.tMax[0], 0);
   }
   EXPECT_NEAR(sum, truth, 2e-3 * truth);
 }

@@ -161,7 +161,7 @@ TEST(ImsLayers, MediaThatGlow) {
                    {Layer::mediaToSurface, 0.025},
                    {Layer::surfaceToMedia, 0.012},
                    {Layer::mediaToMedia, 0.01}},
-                  {.sets = 12}, {.radii = {0.25, 1}});
+                  {.sets = 14}, {.radii = {0.25, 1}});
 }
 
 // --- the longest path ---

@@ -110,15 +110,17 @@ std::vector<Light> lights() {
 
 class Emission {
  public:
-  explicit Emission(const Light& light) : scene_(test::build(light.elements + kPatch)) {}
+  explicit Emission(const Light& light, const EmissionTarget& target = {})
+      : scene_(test::build(light.elements + kPatch)), target_(target) {}
   EmittedRay ray(Pcg32& random) const {
     const Vec2 position{random.next(), random.next()}, direction{random.next(), random.next()};
-    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], position, direction);
+    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], position, direction, target_);
   }
   const SceneView& view() const { return scene_->view; }
 
  private:
   SceneSnapshot scene_;
+  EmissionTarget target_;
 };
 
 TEST(EmittedRay, CarriesTheLightsPower) {
@@ -180,8 +182,8 @@ std::vector<stats::Moments> byConnections(const Emission& emission, int channel)
   return cells;
 }
 
-double arrivalP(const Light& light, float shift = 0) {
-  const Emission emission(light);
+double arrivalP(const Light& light, float shift = 0, const EmissionTarget& target = {}) {
+  const Emission emission(light, target);
   double p = 1;
   for (const int channel : {0, 2}) {
     const auto rays = byRays(emission, channel, shift), connections = byConnections(emission, channel);
@@ -199,6 +201,31 @@ double arrivalP(const Light& light, float shift = 0) {
 TEST(EmittedRay, ArrivesWhereTheLightIsSeen) {
   for (const Light& light : lights()) EXPECT_GT(arrivalP(light), 1e-4) << light.name;
 }
+
+// --- aimed at a part of the scene: the same light, and more of the rays ---
+
+/// The share of the rays that meet the target.
+double meets(const Light& light, const EmissionTarget& target, float share) {
+  const Emission emission(light, {target.center, target.radius, share});
+  Pcg32 random(4);
+  const int n = 20'000;
+  int met = 0;
+  for (int i = 0; i < n; ++i) {
+    const EmittedRay r = emission.ray(random);
+    const Vec3 way = target.center - r.ray.o;
+    met += !isBlack(r.flux) && length(way - r.ray.d * dot(way, r.ray.d)) < target.radius && dot(way, r.ray.d) > 0;
+  }
+  return static_cast<double>(met) / n;
+}
+
+TEST(EmittedRay, AimedRaysCarryTheSameLight) {
+  const EmissionTarget target{{0.2f, 0, kPatchZ}, 0.3f, 0.6f};  // the patch is in it in part
+  for (const Light& light : lights()) {
+    EXPECT_GT(arrivalP(light, 0, target), 1e-4) << light.name;
+    EXPECT_GT(meets(light, target, target.share), 1.3 * meets(light, target, 0)) << light.name;
+  }
+}
+
 // What comes evenly from all around, or from everywhere in one direction, does not tell one place from another.
 TEST(EmittedRay, ArrivalElsewhereIsNoticed) {
   for (const Light& light : lights()) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "methods/instant_scattering/gather.h"
-#include "methods/instant_scattering/restricted_distance.h"
+#include "methods/instant_scattering/nearby_vertex.h"
 
 namespace virga {
 
@@ -96,59 +96,14 @@ class Compensation {
 
   /// x' and the throughput to it; false where there is nothing.
   bool findVertex(const Record& at, const KnownSpace& known, Record& next, Sampler& sampler) const {
-    const Vertex& x = at.vertex;
-    const auto direction = x.sample(sampler.random2D(), sampler.random());
-    if (!(direction.pdf > 0)) return false;
-    MediaRay r = x.leave(scene_, direction.wi);
-    const RestrictedDistance distances{localMean(r.media, x.p), options_.radius};
-    const float t = distances.sample(sampler.random2D());
-    const RayHit hit = gatherer_.isFree(known, x.p, direction.wi, t) ? RayHit{} : rays_.nearest(r.ray, options_.radius);
-    const bool onSurface = hit.found() && hit.t < t;
-    const float end = onSurface ? hit.t : t;
-    const float density = onSurface ? distances.beyond(hit.t) : distances.pdf(t);
-    if (!(density > 0)) return false;
-    const Rgb exact = passMedia(scene_, rays_, r, end, sampler.stream());
-    const Rgb seen = options_.localMeanTransmittance ? Rgb(std::exp(-distances.s * end)) : exact;
-    next.throughput = at.throughput * direction.weight * seen / density;
-    if (isBlack(next.throughput) || isBlack(exact)) return false;
-    if (!(onSurface ? placeOnSurface(hit, r, next) : placeInMedium(r, t, next, sampler))) return false;
-    const float g = geometryTerm(x.p, x.normal(), next.vertex.p, next.vertex.normal());
-    next.throughput *= clampedShareOf(g, gatherer_.bound());
-    return !isBlack(next.throughput);
-  }
-  bool placeInMedium(const MediaRay& r, float t, Record& next, Sampler& sampler) const {
-    const Vec3 p = r.ray.at(t);
-    float sum = 0;
-    for (int i = 0; i < r.media.count(); ++i) sum += mean(scene_.media[r.media.medium(i)].sigmaTAt(p));
-    if (!(sum > 0)) return false;
-    float u = sampler.random() * sum;
-    int chosen = -1;
-    Rgb sigmaT;
-    for (int i = 0; i < r.media.count() && u >= 0; ++i) {
-      const Rgb here = scene_.media[r.media.medium(i)].sigmaTAt(p);
-      if (!(mean(here) > 0)) continue;
-      chosen = r.media.medium(i), sigmaT = here;
-      u -= mean(here);
-    }
-    next.throughput *= sigmaT * (sum / mean(sigmaT));
-    next.vertex = Vertex::inMedium(scene_, chosen, p, -r.ray.d, r.media);
-    return true;
-  }
-  /// Only where virtual lights may stand.
-  bool placeOnSurface(const RayHit& hit, const MediaRay& r, Record& next) const {
-    const SurfacePoint point = surfacePoint(scene_.surfaces[hit.shape], r.ray, hit, scene_.scale);
-    Bsdf textured;
-    const Side side = sideOf(scene_, point, hit, -r.ray.d, textured);
-    if (!side.bsdf->broad() || side.leaks(-r.ray.d, side.wo)) return false;
-    next.vertex = Vertex::onSurface(point, side, -r.ray.d, r.media);
-    return true;
-  }
-
-  /// Mean extinction about a point, of all channels, from the downsampled grids [1/unit].
-  float localMean(const MediaState& media, Vec3 p) const {
-    float s = 0;
-    for (int i = 0; i < media.count(); ++i) s += scene_.media[media.medium(i)].localMeanSigmaT(p);
-    return s;
+    const NearbyVertex<Rays> nearby{scene_, rays_, options_.radius, gatherer_.bound()};
+    const NearbyNumbers numbers{sampler.random2D(), sampler.random(), sampler.random2D(), sampler.random()};
+    const auto isFree = [&](Vec3 w, float t) { return gatherer_.isFree(known, at.vertex.p, w, t); };
+    const auto seen = [&](MediaRay& r, float end, float localMean) {
+      const Rgb exact = passMedia(scene_, rays_, r, end, sampler.stream());
+      return options_.localMeanTransmittance && !isBlack(exact) ? Rgb(std::exp(-localMean * end)) : exact;
+    };
+    return nearby.find(at.vertex, at.throughput, numbers, isFree, seen, next.vertex, next.throughput);
   }
 
   const SceneView& scene_;

@@ -13,8 +13,19 @@ VIRGA_HD inline bool isPlainGrid(const MediumView& medium) {
   return !medium.densityColors.values && double{1} * grid.dense.nx * grid.dense.ny * grid.dense.nz < 2147483648.0;
 }
 
+/// The part of a ray between the first and the last coarse cell that holds anything.
+VIRGA_HD inline ClippedRange whereFilled(const MediumView& medium, const Ray& ray, float t0, float t1) {
+  const GridRay inGrid(medium, ray);
+  ClippedRange filled{t1, t0};
+  forEachMajorant(medium.density, inGrid.o, inGrid.d, t0, t1, [&](float a, float b, float majorant, bool) {
+    if (majorant > 0) filled.t0 = std::min(filled.t0, a), filled.t1 = b;
+    return true;
+  });
+  return filled;
+}
+
 /// Steps whose densities are looked up together.
-inline constexpr int kMarchedAtOnce = 65;
+inline constexpr int kMarchedAtOnce = 32;
 
 /// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
 /// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
@@ -43,9 +54,14 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
   const MediumView& first = scene.media[media.medium(0)];
   if (media.count() == 1 && isPlainGrid(first)) {
+    const ClippedRange filled = whereFilled(first, ray, begin, end);
+    if (!(filled.t0 < filled.t1)) return true;
+    // Step n goes from n - shift to n + 1 - shift; the same steps as without this, but those that are empty.
+    const int from = std::max(0, static_cast<int>((filled.t0 - begin) / step + shift - 0.01f));
+    const int to = std::min(steps, static_cast<int>((filled.t1 - begin) / step + shift + 0.01f));
     float density[kMarchedAtOnce];
-    for (int n0 = 0; n0 <= steps; n0 += kMarchedAtOnce) {
-      const int count = std::min(kMarchedAtOnce, steps + 1 - n0);
+    for (int n0 = from; n0 <= to; n0 += kMarchedAtOnce) {
+      const int count = std::min(kMarchedAtOnce, to + 1 - n0);
       // The first step and the last may be cut: their middles are off by less than half a step.
       const GridRay inGrid(first, {ray.at(begin + step * (static_cast<float>(n0) + 0.5f - shift)), ray.d * step});
       lookupAlong(first.density, inGrid.o, inGrid.d, count, density);
@@ -99,7 +115,7 @@ struct MarchedEye {
     VIRGA_HD Rgb depth() const { return {own[0], own[1], own[2]}; }
   };
 
-  MediaRay at;  ///< its media are those at the surface, or at the end
+  MediaRay at;  ///< its media are those at the surface, or at the end, or where all before it is opaque
   RayHit hit;
   Rgb depth;  ///< optical depth of all of it
   int steps = 0, stretches = 0;
@@ -111,6 +127,8 @@ struct MarchedEye {
 
   bool plain = true;  ///< no mirror, glass or narrow bsdf is met, and no more stretches than can be kept
 
+  /// Nothing behind it counts: less than 1e-7 of it is seen.
+  VIRGA_HD bool opaque() const { return minComponent(depth) > 16; }
   VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
 
   /// Points in equal parts of what is seen of the media, each of them at `shift` in [0, 1) of its part:
@@ -134,12 +152,15 @@ struct MarchedEye {
   }
 };
 
-/// Fills `eye`, steps shifted by `shift`; at most MarchedEye::kSteps of them.
+/// Fills `eye`, steps shifted by `shift`; at most MarchedEye::kSteps of them. `hit`: what the ray meets.
 template <class Rays>
-VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift, MarchedEye& eye,
-                       int steps = MarchedEye::kSteps) {
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, const RayHit& hit,
+                       float shift, MarchedEye& eye, int steps = MarchedEye::kSteps) {
   eye.at = leaveCamera(scene, camera.ray);
-  eye.hit = rays.nearest(eye.at.ray, camera.tMax);
+  eye.hit = hit;
+  eye.depth = Rgb();
+  eye.steps = eye.stretches = 0;
+  eye.plain = true;
   if (eye.hit.found()) {
     eye.point = surfacePoint(scene.surfaces[eye.hit.shape], eye.at.ray, eye.hit, scene.scale);
     eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
@@ -155,11 +176,16 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
         eye.step[eye.steps++] = {
             a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
       eye.depth += here;
-      return true;
+      return !eye.opaque();
     });
     eye.stretches += kept ? 1 : 0;
-    return true;
+    return !eye.opaque();
   });
+}
+template <class Rays>
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift, MarchedEye& eye,
+                       int steps = MarchedEye::kSteps) {
+  marchEye(scene, rays, camera, rays.nearest(camera.ray, camera.tMax), shift, eye, steps);
 }
 
 }  // namespace virga

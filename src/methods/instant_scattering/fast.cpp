@@ -44,13 +44,13 @@ class FastPass {
       if (stop_.stop_requested()) return;
       light[static_cast<size_t>(i)] = indirectLight(computed[static_cast<size_t>(i)]);
     });
-    forEachPixel(frame_, stop_, [&](int x, int y) {
+    upsampling.spread(light, stop_, [&](int x, int y, const Upsampling::Light& indirect) {
       LayerRadiance radiance;
       if (direct_.empty())
         radiance = pixels_.sample(x, y, of(x, y), ImsPixels::Part::direct);
       else
         std::copy_n(direct_[numberOf(x, y)].begin(), direct_[numberOf(x, y)].size(), radiance.value);
-      upsampling.at(light, x, y).addTo(radiance);
+      indirect.addTo(radiance);
       radiance += pixels_.sampleGlow(x, y, of(x, y));
       frame_.set(x, y, radiance);
     });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include "core/parallel.h"
 
 namespace virga {
@@ -16,14 +18,28 @@ constexpr float kRadiusSpacings = 2;
 constexpr int kDirectLayers = static_cast<int>(Layer::surfaceToSurface);
 using DirectLight = std::array<Rgb, kDirectLayers>;
 
+/// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
+template <class Body>
+void forEachBlock(const PassFrame& frame, const std::stop_token& stop, const Body& body) {
+  constexpr int kEdge = 4;
+  static_assert(kEdge * kEdge == FramePixels::Block::kSize);
+  const int across = (frame.width() + kEdge - 1) / kEdge, down = (frame.height() + kEdge - 1) / kEdge;
+  parallelFor(down, 1, [&](int64_t row) {
+    const int y = static_cast<int>(row) * kEdge;
+    for (int i = 0; i < across && !stop.stop_requested(); ++i)
+      body(i * kEdge, y, std::min((i + 1) * kEdge, frame.width()), std::min(y + kEdge, frame.height()));
+  });
+}
+
 /// One pass with its lights.
 class FramePass {
  public:
-  FramePass(const Scene& scene, const FrameLights& lights, const ImsOptions& options, uint64_t seed, uint32_t index)
+  FramePass(const Scene& scene, const FrameLights& lights, const FrameLamps& lamps, const ImsOptions& options,
+            uint64_t seed, uint32_t index)
       : scene_(scene),
         options_(options),
         id_{seed, 0, 0, index},
-        pixels_(scene, lights, options_, index),
+        pixels_(scene, lights, lamps, options_, index),
         paths_(scene, lights.virtualLights(), visibilityOfPaths(options), followed(options)) {}
 
   bool run(const std::stop_token& stop, PassFrame& frame) {
@@ -32,10 +48,10 @@ class FramePass {
     if (stop.stop_requested()) return false;
     const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options_.spacing);
     const std::vector<Upsampling::Light> light = indirectLight(upsampling.computed(), stop);
-    forEachPixel(frame, stop, [&](int x, int y) {
+    upsampling.spread(light, stop, [&](int x, int y, const Upsampling::Light& indirect) {
       LayerRadiance radiance;
       std::copy_n(direct_[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
-      upsampling.at(light, x, y).addTo(radiance);
+      indirect.addTo(radiance);
       radiance += paths_.sampleGlow(x, y, idOf(x, y));
       frame.set(x, y, radiance);
     });
@@ -50,11 +66,20 @@ class FramePass {
     const size_t all = numberOf(0, frame.height());
     std::vector<PixelFeatures> features(all);
     direct_.resize(all);
-    forEachPixel(frame, stop, [&](int x, int y) {
-      LayerRadiance radiance;
-      if (!pixels_.direct(x, y, features[numberOf(x, y)], radiance) || !marches)
-        radiance = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
-      std::copy_n(radiance.value, kDirectLayers, direct_[numberOf(x, y)].begin());
+    tbb::enumerable_thread_specific<FramePixels::Block> blocks;
+    forEachBlock(frame, stop, [&](int x0, int y0, int x1, int y1) {
+      FramePixels::Block& block = blocks.local();
+      block.count = 0;
+      for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x) block.pixels[block.count++] = {x, y};
+      pixels_.direct(block);
+      for (size_t i = 0; i < block.count; ++i) {
+        const auto [x, y] = block.pixels[i];
+        features[numberOf(x, y)] = block.features[i];
+        if (!block.eyes[i].plain || !marches)
+          block.radiance[i] = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+        std::copy_n(block.radiance[i].value, kDirectLayers, direct_[numberOf(x, y)].begin());
+      }
     });
     return features;
   }
@@ -122,14 +147,16 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   lights_ = nullptr;
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
   VirtualLights traced =
-      traceVirtualLights(scene, {options.walks, maxDepth, options.flights}, {seed, 0, 0, index}, stop);
+      traceVirtualLights(scene, {options.walks, maxDepth, options.flights, options.aim}, {seed, 0, 0, index}, stop);
   FrameLights::Options kept;
   kept.most = options.frameLights;
   kept.turn = FixedNumbers{index}.shift();
   if (options.frame.visibility != ReceiverBatch::Visibility::maps) kept.shadows = FrameLights::ShadowMapping::none;
   kept.resolution = options.visibility.resolution, kept.points = options.visibility.points;
   auto lights = std::make_unique<FrameLights>(scene, std::move(traced), kept, stop);
+  auto lamps = std::make_unique<FrameLamps>(scene, FixedNumbers{index}, stop);
   if (stop.stop_requested()) return false;
+  lamps_ = std::move(lamps);
   lights_ = std::move(lights);
   lightsOf_ = index, around_ = around;
   return true;
@@ -142,7 +169,7 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
   const float spacing = lights_->spacing();  // none, if they all lie in a plane
   if (!(own.frame.near.bound > 0))
     own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
-  return FramePass(scene, *lights_, own, seed, index).run(stop, frame);
+  return FramePass(scene, *lights_, *lamps_, own, seed, index).run(stop, frame);
 }
 
 }  // namespace virga

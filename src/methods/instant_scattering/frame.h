@@ -29,8 +29,9 @@ class FrameRenderer {
                      const std::stop_token& stop);
 
   std::unique_ptr<FrameLights> lights_;
-  uint32_t lightsOf_ = 0;  ///< the pass that they belong to
-  int around_ = 0;         ///< the medium that had no end when they were made
+  std::unique_ptr<FrameLamps> lamps_;  ///< there where lights_ are
+  uint32_t lightsOf_ = 0;              ///< the pass that they belong to
+  int around_ = 0;                     ///< the medium that had no end when they were made
 };
 
 }  // namespace virga

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compiled with -ffast-math (CMakeLists.txt): without it no loop with an exponential becomes vector code.
-#include "methods/instant_scattering/frame_kernels.h"
+#include "methods/instant_scattering/lamp_kernels.h"
+#include "scene/shape.h"
 
 namespace virga {
 namespace {
@@ -40,12 +41,8 @@ void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& 
   }
 }
 
-void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen) {
-  kernels::seenThroughFog(light, to, sigmaT, seen);
-}
-
-void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b) {
-  kernels::lightFog(lamps, ray, shift, t, r, g, b);
+void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {
+  kernels::seenThroughFog(from, to, sigmaT, seen);
 }
 
 void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind kind, const KernelShadowMap& map,
@@ -56,8 +53,37 @@ void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind
     kernels::seenThroughMap<EndKind::isotropic>(light, to, map, seen);
 }
 
-void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen) {
-  kernels::seenThroughTable(light, to, table, seen);
+void lookThroughTable(const KernelPoint& from, const KernelReceivers& to, const DepthTable& table, float* seen) {
+  kernels::seenThroughTable(from, to, table, seen);
+}
+
+namespace {
+
+constexpr KernelSurfaces kNone{};  // places in media have no normals, and rays start at them
+
+void aimFromMedia(const LampPoint& lamp, const KernelPlaces& from, const float* value, float scale, RayPacket& rays) {
+  kernels::aimAtLamp(lamp, from, kNone.epsilon, kNone.gx, kNone.gy, kNone.gz, value, kHitError, scale, rays);
+}
+
+}  // namespace
+
+void lightSurfaces(const LampPoint& lamp, const KernelSurfaces& surfaces, float scale, float* value, RayPacket& rays) {
+  kernels::lampOnSurfaces(lamp, surfaces, value);
+  kernels::aimAtLamp(lamp, surfaces, surfaces.epsilon, surfaces.gx, surfaces.gy, surfaces.gz, value, kHitError, scale,
+                     rays);
+}
+
+void lightMedia(const LampPoint& lamp, const KernelPlaces& places, float scale, float* value, RayPacket& rays) {
+  kernels::lampInMedia(lamp, places, value);
+  aimFromMedia(lamp, places, value, scale, rays);
+}
+
+void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scale, KernelPlaces& at,
+              float (*value)[RayPacket::kSize], RayPacket& rays) {
+  kernels::lampInFog(lamp, fog, place, at, value);
+  alignas(64) float most[RayPacket::kSize];
+  for (int i = 0; i < RayPacket::kSize; ++i) most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
+  aimFromMedia(lamp, at, most, scale, rays);
 }
 
 }  // namespace virga

@@ -19,6 +19,11 @@ struct KernelLight {
   float anisotropy;  ///< g of Henyey and Greenstein's phase function; 0 on surfaces
 };
 
+/// A place.
+struct KernelPoint {
+  float x, y, z;
+};
+
 /// Points that are lit, of one kind. Arrays of `count`.
 struct KernelReceivers {
   int count = 0;
@@ -51,11 +56,11 @@ struct DepthView {
 
 /// Optical depths at directions and distances: nodes of an octahedral map of the stretched directions, and radii.
 struct DepthTable {
-  static constexpr int kSide = 12;   ///< nodes along the map's edge; those on its border are there twice
-  static constexpr int kRadii = 24;  ///< the first at 0
-  static constexpr int kSize = kSide * kSide * kRadii;
+  static constexpr int kMostSize = 1 << 24;  ///< side * side * radii stays below it
 
   const float* depth;  ///< [row][column][radius]
+  int side;            ///< nodes along the map's edge; those on its border are there twice
+  int radii;           ///< the first at 0
   DepthView view;
 };
 
@@ -65,26 +70,6 @@ struct KernelShadowMap {
   int resolution;
   float bias;         ///< of a receiver that faces the light, relative to its distance
   float leastCosine;  ///< at flatter angles the bias grows no more
-};
-
-/// Fixed points of lamps, each of which lights one point of a ray through fog.
-struct FogLamps {
-  static constexpr int kCount = 4;
-
-  bool known[kCount] = {};  ///< there is one
-  bool alone = true;        ///< there are no lamps of other kinds
-  float px[kCount] = {}, py[kCount] = {}, pz[kCount] = {};
-  float nx[kCount] = {}, ny[kCount] = {}, nz[kCount] = {};  ///< normal; 0 where it sends to all sides alike
-  float all[kCount] = {};                                   ///< 1 where it does, otherwise 0
-  float r[kCount] = {}, g[kCount] = {}, b[kCount] = {};     ///< intensity along the normal, over kCount [W/sr]
-};
-
-/// A ray through one homogeneous medium, from t0 to t1.
-struct FogRay {
-  float ox, oy, oz, dx, dy, dz;
-  float t0, t1;      ///< [unit]
-  float sigmaT[3];   ///< [1/unit]
-  float anisotropy;  ///< g
 };
 
 namespace kernels {
@@ -139,11 +124,11 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
   }
 }
 
-/// Transmittance from a light through a homogeneous medium that is everywhere.
-VIRGA_HD static inline void seenThroughFog(const KernelLight& l, const KernelReceivers& to, float sigmaT, float* seen) {
+/// Transmittance from a point through a homogeneous medium that is everywhere.
+VIRGA_HD static inline void seenThroughFog(const KernelPoint& l, const KernelReceivers& to, float sigmaT, float* seen) {
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
-    const float x = l.px - to.px[i], y = l.py - to.py[i], z = l.pz - to.pz[i];
+    const float x = l.x - to.px[i], y = l.y - to.py[i], z = l.z - to.pz[i];
     seen[i] = std::exp(-sigmaT * std::sqrt(x * x + y * y + z * z));
   }
 }
@@ -179,86 +164,38 @@ VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelRec
   }
 }
 
-/// Multiplies `seen` by the transmittance that a light's table knows.
-VIRGA_HD static inline void seenThroughTable(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
+/// Multiplies `seen` by the transmittance that a point's table knows.
+VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
                                              float* seen) {
-  constexpr int kSide = DepthTable::kSide, kRadii = DepthTable::kRadii;
   const float* __restrict depth = table.depth;
+  const float* __restrict right = depth + table.radii;
+  const float* __restrict below = depth + table.radii * table.side;
+  const float* __restrict across = below + table.radii;
   const DepthView f = table.view;
-  const float scale = (kRadii - 1) * (kRadii - 1) / (f.last - f.first);
+  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
+  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
-    const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
+    const float x = to.px[i] - l.x, y = to.py[i] - l.y, z = to.pz[i] - l.z + 1e-10f;
     const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / distance;
     const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
     const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
     const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
     float u, v;
     octahedral(a * turned, b * turned, c, u, v);
-    u = (u + 1) * (0.5f * (kSide - 1)), v = (v + 1) * (0.5f * (kSide - 1));
-    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), kRadii - 1.001f);
-    const int column = static_cast<int>(std::fmin(u, kSide - 1.001f)),
-              row = static_cast<int>(std::fmin(v, kSide - 1.001f)), radius = static_cast<int>(m);
-    const float fu = u - static_cast<float>(column), fv = v - static_cast<float>(row),
-                fm = m - static_cast<float>(radius);
-    const int at = (row * kSide + column) * kRadii + radius;
+    u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
+    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
+    const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
+    const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
+    const auto radius = static_cast<float>(static_cast<int>(m));
+    const float fu = u - column, fv = v - row, fm = m - radius;
+    // In floats, which know all integers below 2^24: vector code multiplies them faster.
+    const int at = static_cast<int>((row * columns + column) * distances + radius);
     const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
-    const float d01 = depth[at + kRadii] * (1 - fm) + depth[at + kRadii + 1] * fm;
-    const float d10 = depth[at + kRadii * kSide] * (1 - fm) + depth[at + kRadii * kSide + 1] * fm;
-    const float d11 = depth[at + kRadii * (kSide + 1)] * (1 - fm) + depth[at + kRadii * (kSide + 1) + 1] * fm;
+    const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
+    const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
+    const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
     seen[i] *= std::exp(-((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv));
-  }
-}
-
-/// atan2 of y >= 0 (Abramowitz and Stegun 1964, 4.4.49: error 1e-5), and sine and cosine of an angle in [0, pi] by
-/// their series about pi / 2 (4e-6): the compiler has no vector code for those of the library.
-VIRGA_HD static inline float angleOf(float y, float x) {
-  const float ax = std::fabs(x), least = y < ax ? y : ax, most = y < ax ? ax : y;
-  const float q = least / (most + 1e-30f), q2 = q * q;
-  const float a = q * (0.9998660f + q2 * (-0.3302995f + q2 * (0.1801410f + q2 * (-0.0851330f + q2 * 0.0208351f))));
-  const float upper = y < ax ? a : 1.5707963f - a;
-  return x < 0 ? 3.1415927f - upper : upper;
-}
-VIRGA_HD static inline float sineOf(float angle) {
-  const float x = angle - 1.5707963f, x2 = x * x;
-  return 1 - x2 * (0.5f - x2 * (1 / 24.f - x2 * (1 / 720.f - x2 * (1 / 40320.f - x2 / 3628800.f))));
-}
-VIRGA_HD static inline float cosineOf(float angle) {
-  const float x = angle - 1.5707963f, x2 = x * x;
-  return -x * (1 - x2 * (1 / 6.f - x2 * (1 / 120.f - x2 * (1 / 5040.f - x2 / 362880.f))));
-}
-
-/// Where lamps light the ray, and what that adds, but for albedo, visibility and the transmittance from the lamp: t at
-/// the share `shift` of an equal part of the angle that the ray fills as seen from the lamp (Kulla and Fajardo 2012).
-VIRGA_HD static inline void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* __restrict t,
-                                     float* __restrict r, float* __restrict g, float* __restrict b) {
-  constexpr float kPart = 1.f / FogLamps::kCount;
-#pragma omp simd
-  for (int k = 0; k < FogLamps::kCount; ++k) {
-    const float x = lamps.px[k] - ray.ox, y = lamps.py[k] - ray.oy, z = lamps.pz[k] - ray.oz;
-    const float foot = x * ray.dx + y * ray.dy + z * ray.dz;
-    const float ex = x - ray.dx * foot, ey = y - ray.dy * foot, ez = z - ray.dz * foot;
-    const float height = std::sqrt(ex * ex + ey * ey + ez * ez) + 1e-4f * std::fabs(foot) + 1e-12f;
-    const float start = ray.t0 - foot, whole = ray.t1 - ray.t0;
-    const float range = angleOf(height * whole, height * height + start * (ray.t1 - foot));
-    const float angle = (static_cast<float>(k) + shift) * kPart * range;
-    const float s = sineOf(angle), c = cosineOf(angle);
-    // tan(a + b) - tan(a), over one denominator
-    const float along = s * (height * height + start * start) / std::fmax(height * c - start * s, 1e-20f);
-    const float at = std::fmin(std::fmax(along, 0.f), whole);
-    const float from = start + at, d2 = height * height + from * from, inverse = 1 / std::sqrt(d2);
-    // 1 / d^2 and the density height / (range d^2) cancel.
-    const float cosine =
-        lamps.all[k] + std::fmax(0.f, (lamps.nx[k] * (ray.dx * from - ex) + lamps.ny[k] * (ray.dy * from - ey) +
-                                       lamps.nz[k] * (ray.dz * from - ez)) *
-                                          inverse);
-    const float g2 = ray.anisotropy, toward = from * inverse;  // dot(wo, wi): wo = -d, wi = (y - p) / |y - p|
-    const float q = 1 + g2 * g2 + 2 * g2 * toward;
-    const float value = kInverse4Pi * (1 - g2 * g2) / (q * std::sqrt(q)) * cosine * range / height;
-    t[k] = ray.t0 + at;
-    r[k] = value * lamps.r[k] * ray.sigmaT[0] * std::exp(-ray.sigmaT[0] * at);
-    g[k] = value * lamps.g[k] * ray.sigmaT[1] * std::exp(-ray.sigmaT[1] * at);
-    b[k] = value * lamps.b[k] * ray.sigmaT[2] * std::exp(-ray.sigmaT[2] * at);
   }
 }
 
@@ -270,13 +207,11 @@ VIRGA_HD static inline void lightFog(const FogLamps& lamps, const FogRay& ray, f
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near);
 /// exp(-sigmaT d) for each receiver.
-void lookThroughFog(const KernelLight& light, const KernelReceivers& to, float sigmaT, float* seen);
+void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen);
 /// Multiplies `seen` by 1 or 0: what the light's shadow map says.
 void lookThroughMap(const KernelLight& light, const KernelReceivers& to, EndKind kind, const KernelShadowMap& map,
                     float* seen);
-/// Multiplies `seen` by what the light's table says.
-void lookThroughTable(const KernelLight& light, const KernelReceivers& to, const DepthTable& table, float* seen);
-/// kernels::lightFog
-void lightFog(const FogLamps& lamps, const FogRay& ray, float shift, float* t, float* r, float* g, float* b);
+/// Multiplies `seen` by what the point's table says.
+void lookThroughTable(const KernelPoint& from, const KernelReceivers& to, const DepthTable& table, float* seen);
 
 }  // namespace virga

@@ -4,7 +4,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "methods/instant_scattering/frame_kernels.h"
+#include "methods/instant_scattering/media_between.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -47,22 +47,14 @@ class FrameLights {
   void lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const;
 
  private:
-  enum class Between { nothing, fog, media };
-
   size_t texelsOfMap() const { return static_cast<size_t>(mapSide_) * static_cast<size_t>(mapSide_); }
   void makeMaps(const Scene& scene, const Options& options, const std::stop_token& stop);
-  void makeTables(const Scene& scene, const std::stop_token& stop);
-  void fillTable(const Scene& scene, size_t i);
 
   VirtualLights virtualLights_;
   std::vector<Light> lights_;
-  Between between_ = Between::nothing;
-  Rgb fog_;                       ///< extinction of the homogeneous medium that is everywhere [1/unit]
-  int channels_ = 1;              ///< that differ
-  std::vector<float> depth_;      ///< tables of the first light, channel by channel, of the second...
-  std::vector<DepthView> views_;  ///< of each light's tables
-  std::vector<float> maps_;       ///< shadow maps of the lights; empty: there are none
-  int mapSide_ = 0;               ///< texels of a map in either direction
+  MediaBetween between_;
+  std::vector<float> maps_;  ///< shadow maps of the lights; empty: there are none
+  int mapSide_ = 0;          ///< texels of a map in either direction
 };
 
 /// How the kernels know a phase function, and its g; false if they do not.

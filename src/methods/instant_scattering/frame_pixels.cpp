@@ -8,12 +8,20 @@ CameraRay FramePixels::cameraRay(int x, int y) const {
   return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
 }
 
-bool FramePixels::direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const {
-  MarchedEye eye;
-  marchEye(scene_.view, rays_, cameraRay(x, y), numbers_.shift(), eye);
-  features = pixelFeatures(eye);
-  if (eye.plain) marched_.add(eye, radiance, numbers_);
-  return eye.plain;
+void FramePixels::direct(Block& block) const {
+  CameraRay cameras[Block::kSize];
+  RayPacket packet;
+  for (size_t i = 0; i < block.count; ++i) {
+    cameras[i] = cameraRay(block.pixels[i].x, block.pixels[i].y);
+    packet.set(static_cast<int>(i), cameras[i].ray, cameras[i].tMax);
+  }
+  const PacketHits hits = rays_.surfaces.nearest(packet);
+  for (size_t i = 0; i < block.count; ++i) {
+    marchEye(scene_.view, rays_, cameras[i], hits[i], numbers_.shift(), block.eyes[i]);
+    block.features[i] = pixelFeatures(block.eyes[i]);
+    block.radiance[i] = {};
+  }
+  packets_.add(std::span(block.eyes).first(block.count), std::span(block.radiance).first(block.count));
 }
 
 template <class Visit>
@@ -33,23 +41,68 @@ void FramePixels::visitReceivers(const MarchedEye& eye, Visit&& visit) const {
   if (eye.hit.found()) visit({Vertex::onSurface(eye.point, eye.side, wo, eye.at.media), transmittanceOf(eye.depth)});
 }
 
+NearbyNumbers FramePixels::nearbyNumbers(Pixel p, int receiver) const {
+  // Coarse pixels of a square of 4 x 4, which the filter spans, look in different directions.
+  const int x = p.x / options_.spacing % 4, y = p.y / options_.spacing % 4;
+  const int most = options_.samples + 1;  // receivers of a pixel; the next pass goes on behind them
+  const auto n = static_cast<float>((4 * y + x) * most + receiver);
+  const auto u = [&](float start, float step) {
+    return numbers_.turned(start + step * n, step * static_cast<float>(16 * most));
+  };
+  // Additive sequence of the generalised golden ratio in six dimensions.
+  return {{u(0.5f, 0.8986537f), u(0.5f, 0.8075785f)},
+          u(0.5f, 0.7257334f),
+          {u(0.5f, 0.6521830f), u(0.5f, 0.5860866f)},
+          u(0.5f, 0.5266889f)};
+}
+
+bool FramePixels::findNearby(const Receiver& from, Pixel pixel, int number, Receiver& next) const {
+  const NearbyVertex<EmbreeRays> nearby{scene_.view, rays_, 1 / std::sqrt(options_.frame.near.bound),
+                                        options_.frame.near.bound};
+  const auto seen = [&](MediaRay& r, float end, float) {
+    constexpr int kSteps = 8;
+    Rgb depth;
+    walkMedia(scene_.view, rays_, r, end, [&](float t0, float t1) {
+      return marchMedia(scene_.view, r.media, r.ray, t0, t1, kSteps, numbers_.shift(), [&](float, float, Rgb here) {
+        depth += here;
+        return true;
+      });
+    });
+    return transmittanceOf(depth);
+  };
+  next.pixel = from.pixel, next.x1 = from.vertex.kind;
+  return nearby.find(
+      from.vertex, from.throughput, nearbyNumbers(pixel, number), [](Vec3, float) { return false; }, seen, next.vertex,
+      next.throughput);
+}
+
 std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<const Pixel> pixels) const {
-  ReceiverBatch batch;
+  ReceiverBatch batch, nearby;
   std::vector<std::optional<Upsampling::Light>> light(pixels.size());
   for (size_t n = 0; n < pixels.size(); ++n) {
     MarchedEye eye;
     marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye);
     if (!eye.plain) continue;
     light[n].emplace();
+    int number = 0;
     visitReceivers(eye, [&](Receiver r) {
       r.pixel = static_cast<int>(n);
       batch.add(scene_.view, r);
+      Receiver next;
+      if (options_.compensate == ImsOptions::Compensate::sampled && findNearby(r, pixels[n], number++, next))
+        nearby.add(scene_.view, next);
     });
   }
-  batch.gather(scene_, lights_, options_.frame, [&](int pixel, VertexKind x1, VertexKind x2, Rgb found) {
+  const auto found = [&](int pixel, VertexKind x1, VertexKind x2, Rgb more) {
     Upsampling::Light& l = *light[static_cast<size_t>(pixel)];
-    (x1 == VertexKind::surface ? l.surface : l.media)[x2 == VertexKind::medium] += found;
-  });
+    (x1 == VertexKind::surface ? l.surface : l.media)[x2 == VertexKind::medium] += more;
+  };
+  batch.gather(scene_, lights_, options_.frame, found);
+  if (options_.compensate == ImsOptions::Compensate::sampled) {
+    ReceiverBatch::Options reduced = options_.frame;
+    reduced.near.bound *= CompensationOptions::kReducedClamping;
+    nearby.gather(scene_, lights_, reduced, found);
+  }
   return light;
 }
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "methods/instant_scattering/ims_options.h"
-#include "methods/instant_scattering/marched_light.h"
+#include "methods/instant_scattering/lamp_packets.h"
 #include "methods/instant_scattering/receivers.h"
 #include "methods/instant_scattering/upsampling.h"
 
@@ -15,24 +15,34 @@ namespace virga {
 class FramePixels {
  public:
   /// `pass` turns the fixed numbers: passes that are averaged look at different points.
-  FramePixels(const Scene& scene, const FrameLights& lights, const ImsOptions& options, uint32_t pass)
+  FramePixels(const Scene& scene, const FrameLights& lights, const FrameLamps& lamps, const ImsOptions& options,
+              uint32_t pass)
       : scene_(scene),
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         lights_(lights),
         options_(options),
         numbers_{pass},
-        lamps_(fogLamps(scene.view, numbers_)),
-        marched_(scene_.view, rays_, &lamps_) {}
+        packets_(scene_, rays_, lamps, numbers_) {}
   FramePixels(const FramePixels&) = delete;
   FramePixels& operator=(const FramePixels&) = delete;
 
   using Pixel = Upsampling::Pixel;
 
-  /// What is seen, and light of x1 straight from lamps. False, and no light added, where a mirror, glass or a narrow
-  /// bsdf is seen.
-  bool direct(int x, int y, PixelFeatures& features, LayerRadiance& radiance) const;
+  /// Neighbouring pixels that are lit at once.
+  struct Block {
+    static constexpr int kSize = LampPackets::kSize;
 
-  /// Light that the virtual lights send by way of each pixel's x1; nothing where direct() is false.
+    std::array<Pixel, kSize> pixels;
+    size_t count = 0;
+    std::vector<MarchedEye> eyes = std::vector<MarchedEye>(kSize);  ///< room for them
+    std::array<PixelFeatures, kSize> features;                      ///< what is seen
+    std::array<LayerRadiance, kSize> radiance;                      ///< light of x1 straight from lamps
+  };
+  /// Fills eyes, features and radiance. No light is found where an eye is not plain: where a mirror, glass or a narrow
+  /// bsdf is seen.
+  void direct(Block& block) const;
+
+  /// Light that the virtual lights send by way of each pixel's x1; nothing where an eye is not plain.
   std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;
 
  private:
@@ -40,14 +50,17 @@ class FramePixels {
   template <class Visit>
   void visitReceivers(const MarchedEye& eye, Visit&& visit) const;
   CameraRay cameraRay(int x, int y) const;
+  /// Fixed numbers of receiver `receiver` of a pixel, for findNearby().
+  NearbyNumbers nearbyNumbers(Pixel p, int receiver) const;
+  /// A vertex that finds what clamping takes from a receiver; false where there is nothing.
+  bool findNearby(const Receiver& from, Pixel pixel, int number, Receiver& next) const;
 
   const Scene& scene_;
   EmbreeRays rays_;
   const FrameLights& lights_;
   const ImsOptions& options_;
   FixedNumbers numbers_;
-  FogLamps lamps_;
-  MarchedLight<EmbreeRays> marched_;  ///< refers to the members above
+  LampPackets packets_;  ///< refers to the members above
 };
 
 }  // namespace virga

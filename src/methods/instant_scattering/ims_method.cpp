@@ -66,7 +66,7 @@ class ImsMethod final : public Method {
 
   VirtualLights lightsOf(int64_t pass, const ImsOptions& options, SampleId id, std::stop_token stop) {
     const int maxDepth = options.path.maxDepth;
-    const WalkOptions walks{options.walks, maxDepth < 0 ? -1 : std::max(0, maxDepth - 2), options.flights};
+    const WalkOptions walks{options.walks, maxDepth < 0 ? -1 : std::max(0, maxDepth - 2), options.flights, options.aim};
     if (options.retrace >= 1) return traceVirtualLights(*scene_, walks, id, stop);
     return walks_.lights(*scene_, walks, id, pass, options.retrace, stop);
   }

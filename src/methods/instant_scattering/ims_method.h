@@ -9,7 +9,7 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
      "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing "
      "is drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
-    {"samples", "16; frame: 8",
+    {"samples", "16; frame: 4",
      "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit, or paths where it "
      "sees a mirror or glass"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
@@ -20,6 +20,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"walks", "8192; 256 with shadow maps; frame: 16384", "random walks from the lights in each pass"},
     {"walk_flights", "tracking",
      "of these walks through heterogeneous media: tracking; marching: in steps of half a cell of the grid (biased)"},
+    {"aim", "0; frame: 0.5",
+     "share of the walks that start toward the media, where these do not fill the scene: few walks find a small cloud"},
     {"retrace", "1", "part of the walks that is traced anew in a frame where only media change; the others are kept"},
     {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
      "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of "
@@ -31,7 +33,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
     {"compensation", "path; frame: spread",
      "path: eye paths go on within the radius; sampled: new vertices by restricted distances; none: clamped (biased); "
-     "frame: spread, lights are balls of that radius (biased), or none"},
+     "frame: spread, lights are balls of that radius (biased), none, or sampled: one level, reduced clamping behind it "
+     "(biased; a path may be a segment longer than max_depth)"},
     {"levels", "-1", "sampled: levels of recursion; -1: until Russian roulette ends it"},
     {"ending", "unclamped", "sampled: beyond the last level: unclamped lights, reduced clamping, nothing (biased)"},
     {"v1", "1", "sampled: new vertices at the first level (V_1)"},

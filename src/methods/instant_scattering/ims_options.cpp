@@ -23,12 +23,15 @@ constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
 
 /// Random walks in each pass; shadow maps take time and memory for each of their lights.
 constexpr int kWalks = 8192, kWalksWithMaps = 256, kFrameWalks = 16384;
+/// Of a frame's walks. Measured: docs/decisions/ims-frames.md.
+constexpr float kFrameAim = 0.5f;
+constexpr float kMostAim = 0.95f;
 /// Of the scene's largest extent: the clamping radius where none is given. Measured: docs/methods/ims.md.
 constexpr float kRadiusShare = 0.3f;
 /// Each leaves some lights of 64 bytes.
 constexpr int kMostWalks = 1 << 22;
 /// Of a frame, whose thousand lights share smaller maps' memory.
-constexpr int kFramePoints = 8, kFrameMapResolution = 32, kFrameMapPoints = 0;
+constexpr int kFramePoints = 4, kFrameMapResolution = 32, kFrameMapPoints = 0;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
 constexpr int kLights = 8, kLightsWhereTracked = 1;
 
@@ -94,6 +97,9 @@ void refuseIdle(const Settings& settings, bool idle, std::initializer_list<std::
 }
 
 void refuseIdle(const Settings& settings, const ImsOptions& o) {
+  const bool isFrame = o.mode == ImsOptions::Mode::frame;
+  refuseIdle(settings, isFrame, {"levels", "ending", "v1", "v2", "p1", "p2", "transmittance"},
+             "ims.mode=exact or fast");
   refuseIdle(settings, o.compensate != ImsOptions::Compensate::sampled,
              {"levels", "ending", "v1", "v2", "p1", "p2", "transmittance"}, "ims.compensation=sampled");
   refuseIdle(settings, o.visibility.mode != LightVisibilityOptions::Mode::shadowMap, {"map_resolution", "map_points"},
@@ -116,11 +122,15 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error(fmt::format("--set ims.walks may be at most {}", kMostWalks),
                 {{}, "ask for more passes instead: each has walks of its own", {}});
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
+  o.aim = reader.share("aim").value_or(o.mode == ImsOptions::Mode::frame ? kFrameAim : 0);
+  if (o.aim > kMostAim)
+    throw Error(fmt::format("--set ims.aim may be at most {}: some walks must go elsewhere", kMostAim));
   o.retrace = reader.share("retrace").value_or(o.retrace);
   if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
     throw Error("--set ims.retrace needs ims.mode=exact or fast: a frame traces its walks when the scene changes");
   if (o.retrace < 1 && o.flights == FlightMode::marching)
     throw Error("--set ims.retrace needs ims.walk_flights=tracking: kept walks have flights of their own");
+  if (o.retrace < 1 && o.aim > 0) throw Error("--set ims.aim needs ims.retrace=1: kept walks are not aimed");
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
@@ -146,8 +156,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
     throw Error("--set ims.show=compensation needs ims.compensation=sampled: path does not tell it apart");
   if (o.show != ImsOptions::Show::picture && o.mode != ImsOptions::Mode::exact)
     throw Error("--set ims.show needs ims.mode=exact: others do not tell parts of the picture apart");
-  if (isFrame && (o.compensate == ImsOptions::Compensate::path || o.compensate == ImsOptions::Compensate::sampled))
-    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread or none");
+  if (isFrame && o.compensate == ImsOptions::Compensate::path)
+    throw Error("--set ims.mode=frame follows no paths: give ims.compensation=spread, sampled or none");
   if (!isFrame && o.compensate == ImsOptions::Compensate::spread)
     throw Error("--set ims.compensation=spread needs ims.mode=frame");
   maxDepth_ = reader.integer("max_depth", -1);
@@ -210,6 +220,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"lamp_table", std::to_string(o.lampTable)},
           {"walks", std::to_string(o.walks)},
           {"walk_flights", wordOf(kFlights, o.flights)},
+          {"aim", fmt::format("{}", o.aim)},
           {"retrace", fmt::format("{}", o.retrace)},
           {"lights", std::to_string(isFrame ? o.frameLights : o.amount.lights)},
           {"paths", std::to_string(o.amount.walks)},

@@ -21,6 +21,7 @@ struct ImsOptions {
   int lampTable = 0;  ///< fast: nodes of lamps' tables in either direction; 0: light from lamps is marched
   int walks = 0;
   FlightMode flights = FlightMode::tracking;  ///< of the walks
+  float aim = 0;                              ///< share of the walks that start toward the media
   float retrace = 1;  ///< part of the walks that is traced anew in each frame; 1: all, and none is kept
   PathOptions path;
   GatherAmount amount;  ///< on the eye ray

@@ -29,7 +29,7 @@ class ImsPixels {
         glowTracer_(scene_.view, rays_, glowPaths_),
         gatherer_(scene_.view, rays_, lights, visibility, options_.gather),
         compensation_(scene_.view, rays_, tracer_, gatherer_, options_.compensation),
-        marched_(scene_.view, rays_, nullptr, lampTables) {}
+        marched_(scene_.view, rays_, lampTables) {}
   /// Is the light of lamps found by marching? Not where there are panes, which it does not see through, nor from lamps
   /// in homogeneous media alone: there the tracer's equiangular sampling leaves less noise.
   static bool marches(const SceneView& scene) {

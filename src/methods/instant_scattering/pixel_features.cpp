@@ -7,8 +7,8 @@
 namespace virga {
 namespace {
 
-/// Mean of t in [0, 1] by exp(-depth t): 1 / depth - 1 / (exp(depth) - 1).
-float meanDistance(float d) { return d > 0.05f ? 1 / d - 1 / std::expm1(d) : 0.5f - d / 12; }
+/// Mean of t in [0, 1] by exp(-depth t): 1 / depth - 1 / (exp(depth) - 1), or its series up to an error of 4e-5.
+float meanDistance(float d) { return d > 1 ? 1 / d - 1 / std::expm1(d) : 0.5f - d / 12 + d * d * d / 720; }
 
 /// Of what is seen of the media, by the mean of the channels; 0 if nothing is.
 float meanDepth(const MarchedEye& eye) {

@@ -121,7 +121,8 @@ void ReceiverBatch::distribute(const Group& group, VertexKind lights, const Foun
   for (size_t n = 0; n < group.receivers.size(); ++n) {
     const Receiver& r = group.receivers[n];
     const Rgb sum(group.sum[0][n], group.sum[1][n], group.sum[2][n]);
-    found(r.pixel, r.vertex.kind, lights, sum * r.throughput);
+    const bool isX1 = r.x1 == VertexKind::none;
+    found(r.pixel, isX1 ? r.vertex.kind : r.x1, isX1 ? lights : r.vertex.kind, sum * r.throughput);
   }
 }
 

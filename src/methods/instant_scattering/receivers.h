@@ -9,11 +9,12 @@
 
 namespace virga {
 
-/// A point on an eye ray, x1, that all virtual lights of a frame light.
+/// A point on an eye ray, x1, that all virtual lights of a frame light; or one beyond it, x2.
 struct Receiver {
   Vertex vertex;
-  Rgb throughput;  ///< to the eye, what the vertex scatters left out
-  int pixel = 0;   ///< whose light it is: a number within its batch
+  Rgb throughput;                    ///< to the eye, what the vertex scatters left out
+  int pixel = 0;                     ///< whose light it is: a number within its batch
+  VertexKind x1 = VertexKind::none;  ///< kind of the point on the eye ray, if the vertex lies beyond it
 };
 
 /// Receivers of a few pixels, gathered from all lights at once.

@@ -153,14 +153,18 @@ ShadowMaps::ShadowMaps(const RayScene& surfaces, float offset, std::span<const L
 }
 
 void ShadowMaps::trace(const RayScene& surfaces, float offset, const LightVertex& light, size_t index) {
-  for (size_t i = 0; i < texels(); ++i) {
-    const Vec3 w(directions_.x[i], directions_.y[i], directions_.z[i]);
-    float depth = kInfinity;
-    if (mayBlock(light, w)) {
-      const Vec3 o = light.p + light.normal * std::copysign(offset, dot(w, light.normal));  // 0 in a medium
-      if (const RayHit hit = surfaces.nearest({o, w}, 0, kInfinity); hit.found()) depth = hit.t;
+  // Texels that follow each other in a row look nearly the same way.
+  for (size_t first = 0; first < texels(); first += RayPacket::kSize) {
+    const size_t count = std::min<size_t>(RayPacket::kSize, texels() - first);
+    RayPacket packet;
+    for (size_t i = 0; i < count; ++i) {
+      const Vec3 w(directions_.x[first + i], directions_.y[first + i], directions_.z[first + i]);
+      const Vec3 o =
+          light.p + light.normal * std::copysign(offset, dot(w, light.normal));  // the normal is 0 in a medium
+      packet.set(static_cast<int>(i), {o, w}, mayBlock(light, w) ? kInfinity : 0);
     }
-    depths_[index * texels() + i] = upperHalf(depth);
+    const PacketHits hits = surfaces.nearest(packet);
+    for (size_t i = 0; i < count; ++i) depths_[index * texels() + first + i] = upperHalf(hits[i].t);
   }
 }
 

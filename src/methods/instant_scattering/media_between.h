@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "methods/instant_scattering/frame_kernels.h"
+#include "scene/scene.h"
+
+namespace virga {
+
+/// Transmittance from a set of fixed points to any others: exact where one fog is everywhere, from tables of optical
+/// depth elsewhere.
+class MediaBetween {
+ public:
+  struct Options {
+    int side = 12;   ///< of a table: directions along an octahedral map's edge
+    int radii = 24;  ///< and distances
+  };
+  /// How the media between two points are known.
+  enum class Kind { nothing, fog, tables };
+
+  MediaBetween() = default;
+  /// A stop leaves tables undefined.
+  MediaBetween(const Scene& scene, std::vector<Vec3> points, const Options& options, const std::stop_token& stop);
+
+  Kind kind() const { return kind_; }
+  /// From point number i to receivers, for each channel. `seen` points to three arrays of to.count values; on return
+  /// the second and the third may be the same as the first.
+  void look(size_t i, const KernelReceivers& to, float* seen[3]) const;
+
+ private:
+  size_t sizeOfTable() const {
+    return static_cast<size_t>(options_.side) * static_cast<size_t>(options_.side) *
+           static_cast<size_t>(options_.radii);
+  }
+  void fillRow(const Scene& scene, size_t i, int row);
+
+  Options options_;
+  Kind kind_ = Kind::nothing;
+  int channels_ = 1;  ///< that differ
+  Rgb fog_;           ///< extinction of the homogeneous medium that is everywhere [1/unit]
+  std::vector<Vec3> points_;
+  std::vector<float> depth_;      ///< tables of the first point, channel by channel, of the second...
+  std::vector<DepthView> views_;  ///< of each point's tables
+};
+
+/// Everything outside the surfaces is in the same media: the camera's.
+bool sameMediaEverywhere(const SceneView& view);
+
+}  // namespace virga

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "scene/scene.h"
+
+namespace virga {
+
+/// All of the scene that holds media, as far as rays from a few points tell: where grids hold nothing there are none.
+/// Empty if there are no media.
+Bounds boundsOfMedia(const Scene& scene);
+
+}  // namespace virga
