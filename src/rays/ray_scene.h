@@ -84,6 +84,8 @@ struct EmbreeRays {
 
   RayHit nearest(const Ray& ray, float tMax) const { return surfaces.nearest(ray, 0, tMax); }
   bool occluded(const Ray& ray, float tMax) const { return surfaces.occluded(ray, 0, tMax); }
+  /// A bit for each ray.
+  uint32_t occluded(const RayPacket& rays) const { return surfaces.occluded(rays); }
   void crossings(const Ray& ray, float tMin, float tMax, CrossingList& list) const {
     boundaries.crossings(ray, tMin, tMax, list);
   }

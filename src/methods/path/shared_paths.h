@@ -17,7 +17,7 @@ namespace virga {
 template <class Rays>
 class SharedPaths {
  public:
-  static constexpr int kMost = 16;  ///< paths at once
+  static constexpr int kMost = RayPacket::kSize;  ///< paths at once
 
   VIRGA_HD SharedPaths(const SceneView& scene, const Rays& rays, const PathTracer<Rays>& tracer)
       : scene_(scene), rays_(rays), tracer_(tracer) {
@@ -136,9 +136,18 @@ class SharedPaths {
   /// Light from the x2 of path `own` to all x1.
   VIRGA_HD void share(const First* firsts, int members, int own, const Second& second) const {
     Connection connections[kMost];
+    RayPacket between;
+    for (int m = 0; m < members; ++m) {
+      connections[m] = connect(firsts[m], second.at);
+      if (m == own || !(connections[m].density > 0)) continue;  // an own x2 is seen
+      const Vertex& x1 = firsts[m].at.vertex;
+      const ConnectingRay ray = aimAt(scene_, x1.leave(scene_, normalize(second.at.p - x1.p)), second.at.p);
+      if (ray.tMax > 0) between.set(m, ray.at.ray, ray.tMax);
+    }
+    const uint32_t hidden = rays_.occluded(between);
     float density = 0;
     for (int m = 0; m < members; ++m) {
-      connections[m] = connect(firsts[m], second.at, m == own);
+      if (hidden >> m & 1u) connections[m] = {};
       density += connections[m].density;
     }
     if (!(density > 0)) return;
@@ -151,7 +160,8 @@ class SharedPaths {
     }
   }
 
-  VIRGA_HD Connection connect(const First& first, const Vertex& x2, bool isOwn) const {
+  /// Visibility left out.
+  VIRGA_HD Connection connect(const First& first, const Vertex& x2) const {
     const Vertex& x1 = first.at.vertex;
     const Vec3 way = x2.p - x1.p;
     const float d2 = lengthSquared(way);
@@ -166,7 +176,6 @@ class SharedPaths {
     }
     const Rgb scattering = x1.scattering(w);
     if (isBlack(scattering)) return {};
-    if (!isOwn && isOccluded(x1, w, x2.p)) return {};
     return {first.at.throughput * scattering * space, directionPdf(x1, first.lamp, w) * space};
   }
   /// Density of directions that leave x1 [1/sr].
@@ -175,10 +184,6 @@ class SharedPaths {
     const SurfaceScattering& surface = x1.surface;
     const float own = surface.bsdf.pdf(surface.frame.toLocal(x1.wo), surface.frame.toLocal(w));
     return lamp.mixture(own, facing(x1.point, x1.wo), w);
-  }
-  VIRGA_HD bool isOccluded(const Vertex& x1, Vec3 w, Vec3 end) const {
-    const ConnectingRay ray = aimAt(scene_, x1.leave(scene_, w), end);
-    return ray.tMax > 0 && rays_.occluded(ray.at.ray, ray.tMax);
   }
 
   const SceneView& scene_;
