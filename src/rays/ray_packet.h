@@ -16,12 +16,12 @@ struct RayPacket {
   alignas(64) float dx[kSize], dy[kSize], dz[kSize];
   alignas(64) float tMax[kSize] = {};
 
-  void set(int i, const Ray& ray, float end) {
+  VIRGA_HD void set(int i, const Ray& ray, float end) {
     ox[i] = ray.o.x, oy[i] = ray.o.y, oz[i] = ray.o.z;
     dx[i] = ray.d.x, dy[i] = ray.d.y, dz[i] = ray.d.z;
     tMax[i] = end;
   }
-  Ray ray(int i) const { return {{ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}}; }
+  VIRGA_HD Ray ray(int i) const { return {{ox[i], oy[i], oz[i]}, {dx[i], dy[i], dz[i]}}; }
 };
 
 using PacketHits = std::array<RayHit, RayPacket::kSize>;

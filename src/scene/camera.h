@@ -50,7 +50,7 @@ struct PerspectiveCamera {
   int filmWidth = 1, filmHeight = 1;                ///< of the whole film [pixels]
   int cropX = 0, cropY = 0, width = 1, height = 1;  ///< the part that is rendered [pixels]
 
-  /// Number of a pixel on the whole film, so that a crop window shows the very same samples.
+  /// Number of a pixel on the whole film, so that a crop window is given the very same random numbers.
   VIRGA_HD uint32_t pixelStream(int x, int y) const {
     return static_cast<uint32_t>(y + cropY) * static_cast<uint32_t>(filmWidth) + static_cast<uint32_t>(x + cropX);
   }

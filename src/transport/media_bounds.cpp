@@ -27,8 +27,8 @@ void visitStretches(const SceneView& view, const EmbreeRays& rays, MediaRay r, f
 /// Where boundaries say that media may be; everywhere, if there are media outside of them.
 Bounds whereMediaMayBe(const Scene& scene) {
   const bool within =
-      scene.view.cameraMedia.vacuum() && std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
-                                                      [](const ShapeView& s) { return s.media.declared(); });
+      endlessMedium(scene) == MediaState::kNone && std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
+                                                                [](const ShapeView& s) { return s.media.declared(); });
   return within ? scene.boundaryRays->bounds() : scene.view.bounds;
 }
 

@@ -81,9 +81,10 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
 
 namespace {
 
-/// The sphere around the media; none where they are everywhere.
+/// The sphere around the media; none where one of them has no end. Wherever the camera is: it may move among the
+/// lights.
 EmissionTarget targetOf(const Scene& scene, float share) {
-  if (!(share > 0) || !scene.view.cameraMedia.vacuum()) return {};
+  if (!(share > 0) || endlessMedium(scene) != MediaState::kNone) return {};
   const Bounds media = boundsOfMedia(scene);
   const float radius = media.empty() ? 0 : 0.5f * length(media.extent());
   return radius > 0 ? EmissionTarget{media.center(), radius, share} : EmissionTarget{};

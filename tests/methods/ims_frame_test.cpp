@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <regex>
+
 #include "methods/ims_scenes.h"
 #include "methods/instant_scattering/frame_lights.h"
 #include "methods/instant_scattering/lamp_packets.h"
@@ -89,6 +91,22 @@ TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
   moved.edit(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), {{{{"camera"}, Aspect::camera}}});
   moved.step();
   RenderSession fresh(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), findMethod("ims"), {.settings = settings});
+  fresh.step();
+  EXPECT_EQ(largestDifference(moved.film().beauty(), fresh.film().beauty()), 0);
+}
+
+// Lights and tables are kept when the camera alone moves: they must not depend on the media around it.
+TEST(ImsFrame, LightsStayWhenTheCameraFliesIntoTheSmoke) {
+  const Settings settings{{{"mode", "frame"}, {"walks", "500"}}, 1};
+  const SceneSnapshot inside =
+      sceneOf(std::regex_replace(plume(24), std::regex(R"(origin="[^"]*")"), R"(origin="0.3, 0.1, 0.7")"),
+              ::testing::TempDir());
+  ASSERT_FALSE(inside->view.cameraMedia.vacuum());
+  RenderSession moved(sceneOf(plume(24)), findMethod("ims"), {.settings = settings});
+  moved.step();
+  moved.edit(inside, {{{{"camera"}, Aspect::camera}}});
+  moved.step();
+  RenderSession fresh(inside, findMethod("ims"), {.settings = settings});
   fresh.step();
   EXPECT_EQ(largestDifference(moved.film().beauty(), fresh.film().beauty()), 0);
 }

@@ -209,7 +209,7 @@ TEST(ImsBias, TheLocalMeanIsNotTheTransmittance) {
                       {"compensation", "sampled"},
                       {"show", "compensation"},
                       {"transmittance", transmittance}},
-                     {.sets = 40, .seed = seed});
+                     {.sets = 72, .seed = seed});
   };
   const Difference d = differenceOf(found("mean", 1), found("exact", 2), static_cast<size_t>(Layer::mediaToMedia));
   fmt::print("local mean: {:+.1f} % of what is compensated, p {:.2g}\n", 100 * d.relative, d.p);

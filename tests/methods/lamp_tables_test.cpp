@@ -214,7 +214,7 @@ TEST(FastMarching, SettingsThatMakeNoSenseAreRefused) {
     EXPECT_TRUE(messageOf(scene, settings).starts_with(message)) << messageOf(scene, settings);
   };
   refused({{"lamp_table", "40"}}, "error: --set ims.lamp_table needs ims.mode=fast");
-  refused({{"eye_steps", "40"}}, "error: --set ims.eye_steps needs ims.mode=fast");
+  refused({{"eye_steps", "40"}}, "error: --set ims.eye_steps needs ims.mode=fast or frame");
   refused({{"mode", "fast"}, {"eye_steps", "129"}}, "error: --set ims.eye_steps may be at most 128");
   refused({{"mode", "fast"}, {"lamp_table", "1"}}, "error: --set ims.lamp_table may be 2 to 512, or 0");
 }

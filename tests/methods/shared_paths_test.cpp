@@ -17,6 +17,9 @@ using namespace virga::testing;
 struct Fog {
   double sigmaT = 0.6;
   const char* phase = R"(<phase type="isotropic"/>)";
+  const char* limits = "";  ///< of paths
+  const char* glow = "";
+  const char* lamp = "";  ///< besides the one on the ceiling
 };
 
 constexpr const char* kRectangle = R"(<shape type="rectangle"><transform name="to_world">{}</transform>{}</shape>)";
@@ -30,8 +33,8 @@ std::string wall(const char* transform, const char* colour) {
 /// those of its triangles everywhere), a mirror, a ball of rough metal and a glass ball.
 std::string room(const Fog& fog = {}) {
   return fmt::format(
-             R"(<integrator type="volpath"/>
-  <medium type="homogeneous" id="fog"><float name="sigma_t" value="{}"/><rgb name="albedo" value="0.95, 0.9, 0.8"/>{}</medium>
+             R"(<integrator type="volpath">{}</integrator>
+  <medium type="homogeneous" id="fog"><float name="sigma_t" value="{}"/><rgb name="albedo" value="0.95, 0.9, 0.8"/>{}{}</medium>{}
   <sensor type="perspective"><float name="fov" value="80"/>
     <transform name="to_world"><lookat origin="0, 0, 0.95" target="0, -0.1, -1" up="0, 1, 0"/></transform>
     <film type="hdrfilm"><integer name="width" value="19"/><integer name="height" value="19"/><rfilter type="box"/></film>
@@ -45,7 +48,7 @@ std::string room(const Fog& fog = {}) {
     <translate x="0.3" y="0.9"/></transform>
     <bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>
     <emitter type="area"><rgb name="radiance" value="25, 22, 18"/></emitter></shape>)",
-             fog.sigmaT, fog.phase) +
+             fog.limits, fog.sigmaT, fog.phase, fog.glow, fog.lamp) +
          wall(R"(<rotate x="1" angle="-90"/><translate y="-1"/>)", "0.7, 0.7, 0.7") +
          wall(R"(<rotate x="1" angle="90"/><translate y="1"/>)", "0.7, 0.7, 0.7") +
          wall(R"(<translate z="-1"/>)", "0.6, 0.7, 0.6") +
@@ -70,6 +73,7 @@ Pictures pictures(const SceneSnapshot& scene, bool shared, uint64_t firstSeed, i
                                                    .layers = LayerMask::all(),
                                                    .settings = {{"shared_paths", shared ? "true" : "false"}}});
     const Film& film = session.film();
+    EXPECT_EQ(film.nonFiniteSamples(), 0u);
     for (size_t l = 0; l < kLayerCount; ++l)
       for (int r = 0; r < Film::kReplicates; ++r) {
         const Image image = film.replicateLayer(r, static_cast<Layer>(l));
@@ -111,7 +115,9 @@ void expectSameLayers(const Fog& fog) {
     EXPECT_GT(agreement(alone, shared, static_cast<Layer>(l)), 1e-3) << kLayerNames[l];
   }
   // What the test can tell.
-  const Pictures denser = pictures(sceneOf(room({1.25 * fog.sigmaT, fog.phase})), true, 11, passes);
+  Fog denserFog = fog;
+  denserFog.sigmaT *= 1.25;
+  const Pictures denser = pictures(sceneOf(room(denserFog)), true, 11, passes);
   EXPECT_LT(std::min(agreement(alone, denser, Layer::mediaToMedia), agreement(alone, denser, Layer::surfaceToMedia)),
             1e-3);
 }
@@ -120,6 +126,16 @@ TEST(SharedPaths, EveryLayerInFog) { expectSameLayers({}); }
 
 TEST(SharedPaths, EveryLayerInFogThatScattersForward) {
   expectSameLayers({1.5, R"(<phase type="hg"><float name="g" value="0.5"/></phase>)"});
+}
+
+// Four segments are the fewest at which there is something to share.
+TEST(SharedPaths, EveryLayerOfShortPathsWithTwoLampsInFogThatGlows) {
+  Fog fog;
+  fog.limits = R"(<integer name="max_depth" value="4"/><integer name="rr_depth" value="2"/>)";
+  fog.glow = R"(<rgb name="emission" value="0.01, 0.02, 0.03"/>)";
+  fog.lamp =
+      R"(<emitter type="point"><point name="position" x="-0.2" y="0.1" z="0.3"/><rgb name="intensity" value="0.3"/></emitter>)";
+  expectSameLayers(fog);
 }
 
 TEST(SharedPaths, LeaveLessNoise) {

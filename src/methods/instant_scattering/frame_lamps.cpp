@@ -9,21 +9,13 @@ namespace {
 /// Of a lamp's tables: of the smoke's own shadows a voxel or two, as it is seen from a lamp outside.
 constexpr MediaBetween::Options kTables{.side = 128, .radii = 96};
 
-LightPoint pointOn(const SceneView& scene, const EmitterView& emitter, Vec2 u) {
-  if (!emitter.isRectangle) return sampleLightPoint(scene, emitter, u);
-  const RectangleView& r = emitter.rectangle;  // without the fold of two triangles
-  const Vec3 p = r.corner + r.edgeX * u.x + r.edgeY * u.y;
-  const Vec3 normal = normalize(cross(r.edgeX, r.edgeY)) * scene.surfaces[emitter.shape].orientation;
-  return {p, normal, 1 / emitter.area, false, r.uvAt(p)};
-}
-
 LampPoint lampPoint(const SceneView& scene, const RandomNumbers::Lamp& drawn) {
   const LampChoice lamp = chooseLamp(scene, drawn.choice);
   LampPoint point;
   if (!(lamp.probability > 0)) return point;
   const EmitterView& emitter = scene.emitters[lamp.index];
   if (!isAimedAt(emitter)) return point;
-  const LightPoint on = pointOn(scene, emitter, drawn.u);
+  const LightPoint on = sampleLightPoint(scene, emitter, drawn.u);
   if (!(on.areaPdf > 0)) return point;
   const Rgb sent = (on.pointLike ? emitter.value : emitter.radianceAt(on.uv)) /
                    (on.areaPdf * lamp.probability * static_cast<float>(LampPoints::kCount));

@@ -17,7 +17,7 @@ void FramePixels::direct(Block& block) const {
   }
   const PacketHits hits = rays_.surfaces.nearest(packet);
   for (size_t i = 0; i < block.count; ++i) {
-    marchEye(scene_.view, rays_, cameras[i], hits[i], numbers_.shift(), block.eyes[i]);
+    marchEye(scene_.view, rays_, cameras[i], hits[i], numbers_.shift(), block.eyes[i], options_.eyeSteps);
     block.features[i] = pixelFeatures(block.eyes[i]);
     block.radiance[i] = {};
   }
@@ -81,7 +81,7 @@ std::vector<std::optional<Upsampling::Light>> FramePixels::indirect(std::span<co
   std::vector<std::optional<Upsampling::Light>> light(pixels.size());
   for (size_t n = 0; n < pixels.size(); ++n) {
     MarchedEye eye;
-    marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye);
+    marchEye(scene_.view, rays_, cameraRay(pixels[n].x, pixels[n].y), numbers_.shift(), eye, options_.eyeSteps);
     if (!eye.plain) continue;
     light[n].emplace();
     int number = 0;

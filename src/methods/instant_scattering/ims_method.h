@@ -13,7 +13,7 @@ inline constexpr SettingInfo kImsSettings[] = {
      "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit, or paths where it "
      "sees a mirror or glass"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
-    {"eye_steps", "64", "fast: steps of an eye ray through each stretch of media, at most 128"},
+    {"eye_steps", "64; frame: 128", "fast, frame: steps of an eye ray through each stretch of media, at most 128"},
     {"lamp_table", "0; 1.5 for each voxel where media are grids, 32 to 256",
      "fast: what media let through from point and spot lamps (at most 8) is looked up in tables of so many nodes in "
      "either direction, where all media are grids with nothing around them; 0: it is marched from each point"},

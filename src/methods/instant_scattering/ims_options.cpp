@@ -105,7 +105,8 @@ void refuseIdle(const Settings& settings, const ImsOptions& o) {
   refuseIdle(settings, o.visibility.mode != LightVisibilityOptions::Mode::shadowMap, {"map_resolution", "map_points"},
              "ims.visibility=shadow_map");
   refuseIdle(settings, o.mode == ImsOptions::Mode::exact, {"samples", "spacing"}, "ims.mode=fast or frame");
-  refuseIdle(settings, o.mode != ImsOptions::Mode::fast, {"eye_steps", "lamp_table"}, "ims.mode=fast");
+  refuseIdle(settings, o.mode == ImsOptions::Mode::exact, {"eye_steps"}, "ims.mode=fast or frame");
+  refuseIdle(settings, o.mode != ImsOptions::Mode::fast, {"lamp_table"}, "ims.mode=fast");
   refuseIdle(settings, o.mode == ImsOptions::Mode::frame, {"paths"}, "ims.mode=exact or fast");
 }
 
@@ -166,7 +167,9 @@ ImsSettings::ImsSettings(const Settings& settings) {
 }
 
 void ImsSettings::readMarching(const SettingsReader& reader) {
-  given_.eyeSteps = reader.integer("eye_steps", 1).value_or(given_.eyeSteps);
+  // The steps of a frame are the same in all pixels: where they are few, they show.
+  const bool isFrame = given_.mode == ImsOptions::Mode::frame;
+  given_.eyeSteps = reader.integer("eye_steps", 1).value_or(isFrame ? MarchedEye::kSteps : given_.eyeSteps);
   if (given_.eyeSteps > MarchedEye::kSteps)
     throw Error(fmt::format("--set ims.eye_steps may be at most {}", MarchedEye::kSteps));
   lampTable_ = reader.integer("lamp_table", 0);

@@ -17,7 +17,7 @@ struct ImsOptions {
   Mode mode = Mode::exact;
   int samples = 16;   ///< fast: of a coarse pixel in each pass; frame: points of its eye ray that are lit
   int spacing = 8;    ///< fast, frame: of coarse pixels [pixels]
-  int eyeSteps = 64;  ///< fast: of an eye ray through each stretch of media
+  int eyeSteps = 64;  ///< fast, frame: of an eye ray through each stretch of media
   int lampTable = 0;  ///< fast: nodes of lamps' tables in either direction; 0: light from lamps is marched
   int walks = 0;
   FlightMode flights = FlightMode::tracking;  ///< of the walks
@@ -53,7 +53,6 @@ class ImsSettings {
   ImsOptions given_;
   std::optional<float> radius_;
   std::optional<int> lampTable_, walks_, lights_, maxDepth_, rrDepth_;
-  std::optional<int> compensate_;
 };
 
 /// The values that are in force, by the names of kImsSettings.

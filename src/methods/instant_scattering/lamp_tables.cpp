@@ -124,13 +124,16 @@ LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop
 
 int lampTableSide(const SceneView& scene) {
   constexpr int kFew = 32, kMany = 256;
+  constexpr size_t kMostByDefault = 128 << 20;
   const int lamps = lampsOf(scene);
   const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), isBounded);
   if (lamps == 0 || lamps > LampTables::kMostLamps || scene.media.size == 0 || !bounded) return 0;
   float voxels = 0;
   for (const MediumView& medium : scene.media)
     voxels = std::max(voxels, maxComponent(medium.density.supportHi - medium.density.supportLo));
-  return static_cast<int>(clamp(1.5f * voxels, kFew, kMany));
+  int side = static_cast<int>(clamp(1.5f * voxels, kFew, kMany));
+  while (side > kFew && lampTableBytes(scene, side) > kMostByDefault) side /= 2;
+  return side;
 }
 
 size_t lampTableBytes(const SceneView& scene, int side) {

@@ -108,13 +108,10 @@ class SharedPaths {
     return v.kind == VertexKind::surface && v.surface.bsdf.kind() == Bsdf::Kind::diffuse;
   }
 
-  /// Follows a path that has left its x1 to its end. Behind x1 it carries a number in place of a colour, as what it
-  /// finds beyond x2 is for others, too.
+  /// Follows a path that has left its x1 to its end. Behind x1 it begins anew with a throughput of 1, as what it finds
+  /// beyond x2 is for others, too: own weights may be next to nothing where a guide went against the bsdf.
   VIRGA_HD void follow(Path& path, Second& second, LayerRadiance& sum, Sampler& sampler) const {
-    const float scale = maxComponent(path.throughput);
-    if (!(scale > 0)) return;
-    const Rgb weight = path.throughput / scale;
-    path.throughput = Rgb(scale);
+    const Rgb weight = std::exchange(path.throughput, Rgb(1.f));
     Record x2;
     bool goesOn = extend(path, x2, sampler);
     const bool shared = goesOn && isEven(x2.vertex);
@@ -128,7 +125,7 @@ class SharedPaths {
     }
     while (goesOn) goesOn = tracer_.extend(path, sampler);
     if (shared)
-      second = {x2.vertex, path.radiance.sum() / scale};
+      second = {x2.vertex, path.radiance.sum()};
     else
       take(path, sum, weight);
   }
