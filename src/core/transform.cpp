@@ -117,4 +117,12 @@ Affine::Affine(const Matrix4& m) {
   x = column(0), y = column(1), z = column(2), translation = column(3);
 }
 
+Affine Affine::inverse() const {
+  Matrix4 m;
+  const Vec3 columns[4] = {x, y, z, translation};
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(columns[column][row]);
+  return Affine(m.inverse());
+}
+
 }  // namespace virga

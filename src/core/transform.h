@@ -44,6 +44,8 @@ struct Affine {
   VIRGA_HD Vec3 vector(Vec3 v) const { return x * v.x + y * v.y + z * v.z; }
   /// Product with the transpose of the linear part: maps normals if this is the *inverse* of the points' map.
   VIRGA_HD Vec3 transposed(Vec3 n) const { return {dot(x, n), dot(y, n), dot(z, n)}; }
+  /// Throws nothing, but is of no use where the map is singular.
+  Affine inverse() const;
   friend bool operator==(const Affine&, const Affine&) = default;
 };
 

@@ -93,6 +93,9 @@ struct Bounds {
   friend bool operator==(const Bounds&, const Bounds&) = default;
 };
 
+/// Have two boxes a point in common?
+inline bool overlap(const Bounds& a, const Bounds& b) { return !Bounds{max(a.lo, b.lo), min(a.hi, b.hi)}.empty(); }
+
 /// Right-handed orthonormal frame around a unit z axis (Duff et al. 2017: no branch, no singularity).
 struct Frame {
   Vec3 s, t, n;

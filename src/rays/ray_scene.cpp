@@ -39,7 +39,14 @@ void requireNoError() {
 struct RayShape::Impl {
   RTCGeometry geometry = nullptr;
   analytic::Shape analytic;
-  Bounds bounds;  ///< of an analytic shape
+  Bounds bounds;                    ///< of an analytic shape
+  std::span<const Vec3> positions;  ///< of triangles, as the next
+  std::span<const std::array<uint32_t, 3>> triangles;
+
+  std::array<Vec3, 3> triangle(size_t i) const {
+    const auto& [a, b, c] = triangles[i];
+    return {positions[a], positions[b], positions[c]};
+  }
 
   ~Impl() { rtcReleaseGeometry(geometry); }
 };
@@ -179,11 +186,7 @@ struct ClearanceQuery {
 
 float distanceOf(const RayShape::Impl& shape, unsigned primitive, const ClearanceQuery& query) {
   if (std::holds_alternative<std::monostate>(shape.analytic)) {
-    const auto* positions =
-        static_cast<const Vec3*>(rtcGetGeometryBufferData(shape.geometry, RTC_BUFFER_TYPE_VERTEX, 0));
-    const auto* t = static_cast<const uint32_t*>(rtcGetGeometryBufferData(shape.geometry, RTC_BUFFER_TYPE_INDEX, 0));
-    const Vec3 a = positions[t[3 * primitive]], b = positions[t[3 * primitive + 1]],
-               c = positions[t[3 * primitive + 2]];
+    const auto [a, b, c] = shape.triangle(primitive);
     const float size = maxComponent(max(abs(a), max(abs(b), abs(c))));
     const bool counts = query.counts(size, [&](Vec3 n) { return std::max(dot(n, a), std::max(dot(n, b), dot(n, c))); });
     return counts ? analytic::distanceToTriangle(query.p, a, b, c) : kInfinity;
@@ -230,9 +233,20 @@ std::shared_ptr<const RayShape> analyticShape(const analytic::Shape& shape, cons
 RayShape::RayShape(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RayShape::~RayShape() = default;
 
+bool RayShape::mayMeet(const Bounds& box) const {
+  if (!std::holds_alternative<std::monostate>(impl_->analytic)) return overlap(box, impl_->bounds);
+  for (size_t i = 0; i < impl_->triangles.size(); ++i) {
+    Bounds bounds;
+    for (const Vec3 corner : impl_->triangle(i)) bounds.extend(corner);
+    if (overlap(box, bounds)) return true;
+  }
+  return false;
+}
+
 std::shared_ptr<const RayShape> RayShape::triangles(std::span<const Vec3> positions,
                                                     std::span<const std::array<uint32_t, 3>> triangles) {
   auto impl = std::make_unique<Impl>();
+  impl->positions = positions, impl->triangles = triangles;
   impl->geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   rtcSetSharedGeometryBuffer(impl->geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions.data(), 0,
                              sizeof(Vec3), positions.size());

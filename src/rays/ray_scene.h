@@ -27,6 +27,9 @@ class RayShape {
   /// The image of [-1, 1]^3, as a boundary that rays enter and leave.
   static std::shared_ptr<const RayShape> box(const Matrix4& toWorld);
 
+  /// Do the bounds of any of its parts (triangles, or all of it) overlap `box`?
+  bool mayMeet(const Bounds& box) const;
+
   struct Impl;
   const Impl& impl() const { return *impl_; }
   explicit RayShape(std::unique_ptr<Impl>);

@@ -24,15 +24,14 @@ void visitStretches(const SceneView& view, const EmbreeRays& rays, MediaRay r, f
   });
 }
 
-/// Where boundaries say that media may be; everywhere, if there are media outside of them.
+}  // namespace
+
 Bounds whereMediaMayBe(const Scene& scene) {
   const bool within =
       endlessMedium(scene) == MediaState::kNone && std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
                                                                 [](const ShapeView& s) { return s.media.declared(); });
   return within ? scene.boundaryRays->bounds() : scene.view.bounds;
 }
-
-}  // namespace
 
 Bounds boundsOfMedia(const Scene& scene) {
   constexpr int kPoints = 3, kDirections = 12;  // an octahedral map of these

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "transport/tracking.h"
+#include "transport/media_walk.h"
 
 namespace virga {
 
@@ -52,6 +52,17 @@ VIRGA_HD inline Rgb opticalDepth(const MediumView& medium, const Ray& ray, float
     return true;
   });
   return depth * medium.spectrum * medium.sigmaT;
+}
+
+/// Likewise, of all media along a ray; null boundaries are passed, surfaces are not looked at.
+template <class Rays>
+VIRGA_HD Rgb opticalDepth(const SceneView& scene, const Rays& rays, MediaRay r, float tMax) {
+  Rgb depth;
+  walkMedia(scene, rays, r, tMax, [&](float t0, float t1) {
+    for (int i = 0; i < r.media.count(); ++i) depth += opticalDepth(scene.media[r.media.medium(i)], r.ray, t0, t1);
+    return true;
+  });
+  return depth;
 }
 
 }  // namespace virga

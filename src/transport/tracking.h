@@ -153,22 +153,32 @@ struct IgnoreLength {
   VIRGA_HD void operator()(float) const {}
 };
 
-/// Distance t in [t0, t1) of the next real collision in a grey medium, or infinity: density sigma_t(t) tau(t0, t).
-/// Analytic where the medium is homogeneous, otherwise delta tracking on local majorants (Woodcock 1965;
-/// Szirmay-Kalos et al. 2011).
-VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
-  if (medium.homogeneous) {
-    const float t = t0 + exponential(random) / medium.sigmaT;
-    return t < t1 ? t : kInfinity;
-  }
+/// Delta tracking on local majorants in a grey heterogeneous medium (Woodcock 1965; Szirmay-Kalos et al. 2011): the
+/// distance t in [t0, t1) of the next real collision, or infinity. met(t, ratio) at each tentative collision up to that
+/// one, and at it: each of them is real with probability `ratio`, and is found with density sigma_t(t) tau(t0, t) /
+/// ratio.
+template <class Met>
+VIRGA_HD float trackFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random, Met&& met) {
   float found = kInfinity;
   const auto visit = [&](const TentativeCollision& c) {
-    const bool real = random.next() < c.ratio(medium);
+    const float ratio = c.ratio(medium);
+    const bool real = random.next() < ratio;
+    met(c.t, ratio);
     if (real) found = c.t;
     return !real;
   };
   forEachTentativeCollision(medium, medium.sigmaT, ray, t0, t1, random, visit, IgnoreLength{});
   return found;
+}
+
+/// Distance t in [t0, t1) of the next real collision in a grey medium, or infinity: density sigma_t(t) tau(t0, t).
+/// Analytic where the medium is homogeneous, otherwise delta tracking.
+VIRGA_HD inline float sampleFreeFlight(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
+  if (medium.homogeneous) {
+    const float t = t0 + exponential(random) / medium.sigmaT;
+    return t < t1 ? t : kInfinity;
+  }
+  return trackFreeFlight(medium, ray, t0, t1, random, [](float, float) {});
 }
 
 /// The flight of one channel, the hero's, through a medium of any colour; all that was drawn is noted in `spectral`.

@@ -176,7 +176,7 @@ TEST(Contract, UnknownSettingsAreRefused) {
   };
   EXPECT_EQ(message("max_dept", "3"),
             "error: method \"path\" has no setting \"max_dept\"; did you mean \"max_depth\"?\n"
-            "  note: available: max_depth, rr_depth, equiangular_depth, shared_paths");
+            "  note: available: max_depth, rr_depth, equiangular_depth, shared_paths, lamp_table");
   EXPECT_EQ(message("max_depth", "deep"), "error: --set path.max_depth: \"deep\" is not an integer of at least -1");
 }
 

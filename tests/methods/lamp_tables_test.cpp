@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Tables of what media let through from lamps, and the marching of `ims.mode=fast`: against exact optical depths, and
 // pixel by pixel against `path`.
-#include "methods/instant_scattering/lamp_tables.h"
+#include "transport/lamp_tables.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

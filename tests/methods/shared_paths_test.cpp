@@ -6,8 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "methods/layer_means.h"
 #include "methods/path/pixel_groups.h"
-#include "methods/rendering.h"
 
 namespace virga {
 namespace {
@@ -58,66 +58,18 @@ std::string room(const Fog& fog = {}) {
                      R"(<bsdf type="conductor"/>)");
 }
 
-/// Means of a layer over the picture and its quarters, in each channel: a moment for each, of independent pictures.
-using Means = std::array<stats::Moments, 15>;
-
-struct Pictures {
-  Means layers[kLayerCount];
-};
-
-Pictures pictures(const SceneSnapshot& scene, bool shared, uint64_t firstSeed, int passes) {
-  Pictures result;
-  for (uint64_t seed = firstSeed; seed < firstSeed + 3; ++seed) {
-    const RenderSession session = rendered(scene, {.passes = passes,
-                                                   .seed = seed,
-                                                   .layers = LayerMask::all(),
-                                                   .settings = {{"shared_paths", shared ? "true" : "false"}}});
-    const Film& film = session.film();
-    EXPECT_EQ(film.nonFiniteSamples(), 0u);
-    for (size_t l = 0; l < kLayerCount; ++l)
-      for (int r = 0; r < Film::kReplicates; ++r) {
-        const Image image = film.replicateLayer(r, static_cast<Layer>(l));
-        double sums[15] = {};
-        for (int y = 0; y < image.height; ++y)
-          for (int x = 0; x < image.width; ++x)
-            for (int c = 0; c < 3; ++c) {
-              const Rgb pixel = image.at(x, y);
-              const float value = c == 0 ? pixel.r : c == 1 ? pixel.g : pixel.b;
-              const int quarter = (2 * x >= image.width ? 1 : 0) + (2 * y >= image.height ? 2 : 0);
-              sums[5 * c + quarter] += static_cast<double>(value);
-              sums[5 * c + 4] += static_cast<double>(value);
-            }
-        for (size_t i = 0; i < 15; ++i) result.layers[l][i].add(sums[i] / (image.width * image.height));
-      }
-  }
-  return result;
-}
-
-/// p-value that a layer is the same: of the worst of fifteen tests, times fifteen.
-double agreement(const Pictures& a, const Pictures& b, Layer layer) {
-  double p = 1;
-  for (size_t i = 0; i < 15; ++i) {
-    const stats::Moments &left = a.layers[static_cast<size_t>(layer)][i],
-                         &right = b.layers[static_cast<size_t>(layer)][i];
-    p = std::min(p, 15 * stats::welchTest(left, right));
-  }
-  return p;
+LayerMeans pictures(const SceneSnapshot& scene, bool shared, uint64_t seed, int passes) {
+  return layerMeans(scene, {.passes = passes, .seed = seed, .settings = {{"shared_paths", shared ? "true" : "false"}}});
 }
 
 void expectSameLayers(const Fog& fog) {
   constexpr int passes = 96;
-  const Pictures alone = pictures(sceneOf(room(fog)), false, 1, 2 * passes);
-  const Pictures shared = pictures(sceneOf(room(fog)), true, 11, passes);
-  for (size_t l = 0; l < kLayerCount; ++l) {
-    const stats::Moments &a = alone.layers[l][4], &b = shared.layers[l][4];
-    fmt::print("{:18} {:.5f} +- {:.2f} %, shared {:.5f} +- {:.2f} %\n", kLayerNames[l], a.mean(),
-               100 * a.standardError() / a.mean(), b.mean(), 100 * b.standardError() / b.mean());
-    EXPECT_GT(agreement(alone, shared, static_cast<Layer>(l)), 1e-3) << kLayerNames[l];
-  }
+  const LayerMeans alone = pictures(sceneOf(room(fog)), false, 1, 2 * passes);
+  expectSameLayers(alone, pictures(sceneOf(room(fog)), true, 11, passes), "shared");
   // What the test can tell.
   Fog denserFog = fog;
   denserFog.sigmaT *= 1.25;
-  const Pictures denser = pictures(sceneOf(room(denserFog)), true, 11, passes);
+  const LayerMeans denser = pictures(sceneOf(room(denserFog)), true, 11, passes);
   EXPECT_LT(std::min(agreement(alone, denser, Layer::mediaToMedia), agreement(alone, denser, Layer::surfaceToMedia)),
             1e-3);
 }

@@ -7,8 +7,8 @@
 
 #include "methods/instant_scattering/eye_march.h"
 #include "methods/instant_scattering/ims_method.h"
-#include "methods/instant_scattering/lamp_tables.h"
 #include "methods/settings_reader.h"
+#include "transport/lamp_tables.h"
 
 namespace virga {
 namespace {
@@ -172,11 +172,7 @@ void ImsSettings::readMarching(const SettingsReader& reader) {
   given_.eyeSteps = reader.integer("eye_steps", 1).value_or(isFrame ? MarchedEye::kSteps : given_.eyeSteps);
   if (given_.eyeSteps > MarchedEye::kSteps)
     throw Error(fmt::format("--set ims.eye_steps may be at most {}", MarchedEye::kSteps));
-  lampTable_ = reader.integer("lamp_table", 0);
-  if (!lampTable_ || *lampTable_ == 0) return;
-  if (*lampTable_ < LampTables::kLeastSide || *lampTable_ > LampTables::kMostSide)
-    throw Error(fmt::format("--set ims.lamp_table may be {} to {}, or 0 for none", LampTables::kLeastSide,
-                            LampTables::kMostSide));
+  lampTable_ = LampTableSetting(reader, "ims");
 }
 
 ImsOptions ImsSettings::forScene(const Scene& scene) const {
@@ -192,11 +188,7 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
     amount->lights = isFrame ? lights : lights_.value_or(lights);
   if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
-  const int tableSide = lampTableSide(scene.view);  // 0: marched light is all that there can be
-  o.lampTable = tableSide == 0 ? 0 : lampTable_.value_or(tableSide);
-  if (lampTableBytes(scene.view, o.lampTable) > LampTables::kMostBytes)
-    throw Error(fmt::format("--set ims.lamp_table={}: the tables would take more than 1 GB", o.lampTable),
-                {{}, "choose fewer nodes, or 0 for none", {}});
+  o.lampTable = lampTable_.nodes(scene.view, lampTableSide(scene.view));  // 0: marched light is all that there can be
   o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
   const float extent = extentOf(scene.view);
   o.compensation.radius = radius_.value_or(kRadiusShare * extent);

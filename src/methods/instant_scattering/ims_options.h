@@ -3,6 +3,7 @@
 
 #include "methods/instant_scattering/compensation.h"
 #include "methods/instant_scattering/receivers.h"
+#include "methods/lamp_table_setting.h"
 #include "methods/method.h"
 #include "methods/settings_reader.h"
 
@@ -52,7 +53,8 @@ class ImsSettings {
 
   ImsOptions given_;
   std::optional<float> radius_;
-  std::optional<int> lampTable_, walks_, lights_, maxDepth_, rrDepth_;
+  LampTableSetting lampTable_;
+  std::optional<int> walks_, lights_, maxDepth_, rrDepth_;
 };
 
 /// The values that are in force, by the names of kImsSettings.

@@ -4,7 +4,8 @@
 #include "core/sampler.h"
 #include "methods/instant_scattering/eye_march.h"
 #include "methods/instant_scattering/frame_kernels.h"
-#include "methods/instant_scattering/lamp_tables.h"
+#include "transport/lamp_tables.h"
+#include "transport/visibility.h"
 
 namespace virga {
 

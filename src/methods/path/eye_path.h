@@ -5,6 +5,7 @@
 #include "image/layers.h"
 #include "transport/equiangular.h"
 #include "transport/lamp_guide.h"
+#include "transport/tabled_lamps.h"
 #include "transport/vertex.h"
 
 namespace virga {
@@ -18,6 +19,8 @@ struct PathOptions {
   int equiangularDepth =
       1;  ///< segments on which technique B aims at all lights; at small ones and those in thin fog it always does
   Sources sources = Sources::all;
+  View<TabledLamp> tabled =
+      {};  ///< lamps whose light is looked up (FlightLight); none where virtual lights are gathered
 };
 
 /// A path from the eye as far as PathTracer has followed it: a ray, and what it needs to know of the vertices before.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/path/path_method.h"
 
+#include "methods/lamp_table_setting.h"
 #include "methods/path/path_pixels.h"
 #include "methods/pixels.h"
 #include "methods/settings_reader.h"
@@ -17,11 +18,15 @@ class PathMethod final : public Method {
     rrDepth_ = reader.integer("rr_depth", 1);
     equiangularDepth_ = reader.integer("equiangular_depth", 0);
     sharedPaths_ = reader.boolean("shared_paths").value_or(true);
+    lampTable_ = LampTableSetting(reader, "path");
     seed_ = settings.seed;
+    tables_.reset();
+    tableSide();  // throws where tables would be too large
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
     scene_ = std::move(next);
+    if (!changes.cameraAlone()) tables_.reset();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -30,10 +35,16 @@ class PathMethod final : public Method {
     return {{"max_depth", std::to_string(options.maxDepth)},
             {"rr_depth", std::to_string(options.rrDepth)},
             {"equiangular_depth", std::to_string(options.equiangularDepth)},
-            {"shared_paths", sharesPaths() ? "true" : "false"}};
+            {"shared_paths", sharesPaths() ? "true" : "false"},
+            {"lamp_table", std::to_string(tableSide())}};
   }
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
+    if (!tables_) {
+      auto tables = std::make_unique<TabledLamps>(*scene_, tableSide(), stop);
+      if (stop.stop_requested()) return {.completed = false};
+      tables_ = std::move(tables);
+    }
     const PathPixels pixels(*scene_, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
@@ -55,13 +66,19 @@ class PathMethod final : public Method {
   PathOptions optionsForScene() const {
     return {.maxDepth = maxDepth_.value_or(scene_->integrator.maxDepth),
             .rrDepth = rrDepth_.value_or(scene_->integrator.rrDepth),
-            .equiangularDepth = equiangularDepth_.value_or(PathOptions{}.equiangularDepth)};
+            .equiangularDepth = equiangularDepth_.value_or(PathOptions{}.equiangularDepth),
+            .tabled = tables_ ? tables_->view() : View<TabledLamp>{}};
   }
   bool sharesPaths() const {
     return sharedPaths_ && SharedPaths<EmbreeRays>::possible(scene_->view, optionsForScene());
   }
 
+  /// 0: light is not looked up.
+  int tableSide() const { return lampTable_.nodes(scene_->view, tabledLampSide(scene_->view)); }
+
   SceneSnapshot scene_;
+  std::unique_ptr<TabledLamps> tables_;  ///< of this scene, once a pass has asked for them
+  LampTableSetting lampTable_;
   bool sharedPaths_ = true;
   std::optional<int> maxDepth_, rrDepth_, equiangularDepth_;
   uint64_t seed_ = 0;

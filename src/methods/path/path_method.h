@@ -14,6 +14,9 @@ inline constexpr SettingInfo kPathSettings[] = {
     {"shared_paths", "true",
      "where one homogeneous medium fills all space, 16 pixels at a time share paths (docs/decisions/shared-paths.md); "
      "false: the pixels' errors are independent"},
+    {"lamp_table", "0; 1.5 for each voxel where media are grids, at most 256 and as many as take little memory",
+     "nodes along the edges of tables of what media let through from point and spot lamps, by which light is gathered "
+     "all along free flights (docs/decisions/flight-light.md); 0 for none"},
 };
 
 /// Unidirectional volumetric path tracing: the reference that every other method is held against.

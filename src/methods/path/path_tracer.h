@@ -2,6 +2,7 @@
 #pragma once
 
 #include "methods/path/eye_path.h"
+#include "methods/path/flight_light.h"
 #include "transport/roulette.h"
 #include "transport/visibility.h"
 
@@ -25,7 +26,8 @@ class PathTracer {
         options_(options),
         lamps_(options.sources != PathOptions::Sources::glow),
         glow_(scene.emissive && options.sources != PathOptions::Sources::lamps),
-        aims_(lamps_ && hasLightsToAimAt(scene)) {}
+        aims_(lamps_ && hasLightsToAimAt(scene)),
+        flightLight_(scene, rays, lamps_ ? options.tabled : View<TabledLamp>{}) {}
 
   using Path = EyePath;
   using Record = EyePath::Record;
@@ -56,6 +58,9 @@ class PathTracer {
     EquiangularSegment segment;
     Collision collision;
     SpectralFlight spectral(path.throughput, scene_.chromatic ? path.one(sampler) : 0.f);
+    Gathered gathered;
+    if (flightLight_.any() && mayScatter(path) && hasLights())
+      gathered = flightLight_.begin(path.throughput, path.one(sampler));
     Rgb glow;
     bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
@@ -64,8 +69,11 @@ class PathTracer {
         segment = equiangularSegment(path, walk, t0, t1);
         if (segment.active()) segmentMedia = walk.media;
       }
-      collision = scene_.chromatic ? sampleCollision(scene_, walk, t0, t1, sampler.stream(), spectral)
-                                   : sampleCollision(scene_, walk, t0, t1, sampler.stream());
+      if (gathered.active())
+        collision = flightLight_.fly(walk, t0, t1, gathered, sampler.stream());
+      else
+        collision = scene_.chromatic ? sampleCollision(scene_, walk, t0, t1, sampler.stream(), spectral)
+                                     : sampleCollision(scene_, walk, t0, t1, sampler.stream());
       // What glows before a free flight's end counts in full: in expectation that is the transmittance.
       if (glow_) glow += estimateEmission(scene_, walk, t0, std::min(t1, collision.t), sampler.stream());
       return !collision.found();
@@ -73,6 +81,7 @@ class PathTracer {
     if (segment.active() && mayScatter(path)) connectEquiangular(path, segment, segmentMedia, sampler);
     if (scene_.chromatic) path.throughput *= spectral.weight(path.throughput);
     if (glow_) path.add(path.layers, glow);
+    if (gathered.active()) addGathered(path, gathered);
     if (collision.found()) return scatterInMedium(path, walk.media, collision, segment, sampler);
     if (hit.found()) return scatterOnSurface(path, walk.media, hit, sampler);
     addEnvironment(path);
@@ -240,12 +249,19 @@ class PathTracer {
     path.add(layers, scattered * seen * (phase.value(wo, light.wi) * w * share / own));
   }
 
+  /// Light that a free flight has gathered on its way to a vertex in a medium.
+  VIRGA_HD void addGathered(Path& path, const Gathered& gathered) const {
+    LayerPath layers = path.layers;
+    layers.scatter(VertexKind::medium);
+    path.add(layers, gathered.light);
+  }
+
   /// Technique A at a medium vertex.
   VIRGA_HD void connectMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
                               Sampler& sampler) const {
     if (!connectsHere(path)) return;
     const Connection c = sampleConnection(path, x, sampler);
-    if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
+    if (!(c.light.pdf > 0) || isBlack(c.light.radiance) || flightLight_.has(c.emitter)) return;
     const float own = c.choice * c.light.pdf;
     const float phasePdf = c.light.delta ? 0 : phase.pdf(wo, c.light.wi);
     float w = weight(own, phasePdf);
@@ -275,7 +291,10 @@ class PathTracer {
     const float w = weight(own, c.light.delta ? 0 : side.bsdf->pdf(side.wo, wi));
     const MediaRay leaving = leaveSurface(scene_, point, -path.at.ray.d, c.light.wi, media);
     LayerPath layers = path.layers;
-    const Rgb seen = visibility(leaving, point.p, c.light, layers, sampler);
+    const Rgb seen =
+        flightLight_.has(c.emitter)
+            ? Rgb(flightLight_.seen(c.emitter, leaving, point.p, maxComponent(path.throughput), sampler.stream()))
+            : visibility(leaving, point.p, c.light, layers, sampler);
     path.add(layers, value * c.light.radiance * seen * (std::fabs(wi.z) * w / own));
   }
 
@@ -422,6 +441,7 @@ class PathTracer {
   const PathOptions& options_;
   bool lamps_, glow_;  ///< does their light count?
   bool aims_;
+  FlightLight<Rays> flightLight_;
 };
 
 }  // namespace virga

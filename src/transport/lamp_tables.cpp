@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "methods/instant_scattering/lamp_tables.h"
+#include "transport/lamp_tables.h"
 
 #include "core/parallel.h"
-#include "methods/instant_scattering/eye_march.h"
+#include "transport/media_bounds.h"
+#include "transport/media_march.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -13,14 +14,6 @@ constexpr float kMostReach = 1.5f;
 
 bool isBounded(const MediumView& medium) {
   return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
-}
-
-Affine inverse(const Affine& a) {
-  Matrix4 m;
-  const Vec3 columns[4] = {a.x, a.y, a.z, a.translation};
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column) m(row, column) = static_cast<double>(columns[column][row]);
-  return Affine(m.inverse());
 }
 
 /// What the cells of a grid fill that are not empty, in the world.
@@ -36,7 +29,7 @@ void extendByGrid(const MediumView& medium, Bounds& bounds) {
         filled.extend(lo), filled.extend(lo + cells.cellSize);
       }
   if (filled.empty()) return;
-  const Affine toWorld = inverse(medium.worldToDensity);
+  const Affine toWorld = medium.worldToDensity.inverse();
   for (int i = 0; i < 8; ++i) bounds.extend(toWorld.point(filled.corner(i)));
 }
 
@@ -100,11 +93,17 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
 
 }  // namespace
 
+Bounds filledBounds(const Scene& scene) {
+  Bounds bounds;
+  for (const MediumView& medium : scene.view.media) extendByGrid(medium, bounds);
+  const Bounds within = whereMediaMayBe(scene);
+  return {max(bounds.lo, within.lo), min(bounds.hi, within.hi)};
+}
+
 LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop) {
   const SceneView& view = scene.view;
   if (lampTableSide(view) == 0) return;
-  Bounds bounds;
-  for (const MediumView& medium : view.media) extendByGrid(medium, bounds);
+  const Bounds bounds = filledBounds(scene);
   if (bounds.empty()) return;
   const int endless = endlessMedium(scene), channels = channelsOf(view);
   for (const EmitterView& emitter : view.emitters) {

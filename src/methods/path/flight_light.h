@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "transport/tabled_lamps.h"
+
+namespace virga {
+
+/// What a free flight gathers of a lamp's light on its way.
+struct Gathered {
+  int emitter = -1;  ///< the lamp; -1: nothing is gathered
+  float choice = 0;  ///< its probability
+  float weight = 0;  ///< largest channel of the path's throughput
+  Rgb light;         ///< so far, without the throughput [W/(m^2 sr)]
+
+  VIRGA_HD bool active() const { return emitter >= 0; }
+};
+
+/// Light from lamps with tables, by an expected value in place of a sample: at *all* tentative collisions of a free
+/// flight, each weighted by its chance to be real, rather than at the real one alone (Spanier 1966; with null
+/// collisions Miller, Georgiev and Jarosz 2019). A look-up costs a fraction of a shadow ray.
+/// docs/decisions/flight-light.md
+template <class Rays>
+class FlightLight {
+ public:
+  VIRGA_HD FlightLight(const SceneView& scene, const Rays& rays, View<TabledLamp> lamps)
+      : scene_(scene), rays_(rays), lamps_(lamps) {}
+
+  VIRGA_HD bool any() const { return lamps_.size > 0; }
+  /// Is the light of this emitter gathered along flights?
+  VIRGA_HD bool has(int emitter) const { return any() && lamps_[emitter].present(); }
+
+  /// Begins to gather for a flight: `u` in [0, 1) chooses the lamp.
+  VIRGA_HD Gathered begin(Rgb throughput, float u) const {
+    const auto choice = scene_.emitterChoice.sample(u);
+    if (!has(choice.index)) return {};
+    return {choice.index, choice.probability, maxComponent(throughput), {}};
+  }
+
+  /// The first real collision within [t0, t1], as sampleCollision() finds it; adds to what is gathered.
+  VIRGA_HD Collision fly(const MediaRay& r, float t0, float t1, Gathered& gathered, Pcg32& random) const {
+    if (r.media.count() == 1) {
+      const int index = r.media.medium(0);
+      const auto met = [&](float t, float ratio) {
+        if (ratio > 0) gather(r, t, index, ratio, gathered, random);
+      };
+      const float t = trackFreeFlight(scene_.media[index], r.ray, t0, t1, random, met);
+      return t < t1 ? Collision{t, index} : Collision{};
+    }
+    // Flights through several media end one another: only where they end in fact is known to count.
+    const Collision c = sampleCollision(scene_, r, t0, t1, random);
+    if (c.found()) gather(r, c.t, c.medium, 1, gathered, random);
+    return c;
+  }
+
+  /// Unbiased estimate of transmittance times visibility between a lamp with a table and x, where `r` starts or a
+  /// little beside of which it does. The result is to count `weight` times.
+  VIRGA_HD float seen(int emitter, const MediaRay& r, Vec3 x, float weight, Pcg32& random) const {
+    const TabledLamp& lamp = lamps_[emitter];
+    const ConnectingRay ray = aimAt(scene_, r, lamp.table.p);
+    if (!(ray.tMax > 0)) return 1;
+    if (rays_.occluded(ray.at.ray, ray.tMax)) return 0;
+    return estimateTransmittance(scene_, rays_, lamp, x, ray, weight, random);
+  }
+
+ private:
+  VIRGA_HD void gather(const MediaRay& r, float t, int medium, float ratio, Gathered& gathered, Pcg32& random) const {
+    const Vec3 x = r.ray.at(t), wo = -r.ray.d;
+    const EmitterView& emitter = scene_.emitters[gathered.emitter];
+    const LightSample light = towardPoint(emitter, x, {emitter.position, {}, 1, true});
+    if (!(light.pdf > 0) || isBlack(light.radiance)) return;
+    const MediumView& here = scene_.media[medium];
+    const float phase = here.phaseBlends.size == 0 ? here.phase.value(wo, light.wi) : here.phaseAt(x).value(wo, light.wi);
+    const float scattered = ratio * phase / (gathered.choice * light.pdf);
+    const float seen = seenFromMedium(gathered, {{x, light.wi}, r.media, 0}, ratio, random);
+    gathered.light += here.albedoAt(x) * light.radiance * (scattered * seen);
+  }
+  VIRGA_HD float seenFromMedium(const Gathered& gathered, const MediaRay& r, float ratio, Pcg32& random) const {
+    const TabledLamp& lamp = lamps_[gathered.emitter];
+    const float weight = ratio * gathered.weight;
+    if (!lamp.clear) return seen(gathered.emitter, r, r.ray.o, weight, random);
+    const ConnectingRay ray = aimAt(scene_, r, lamp.table.p);
+    return ray.tMax > 0 ? estimateTransmittance(scene_, rays_, lamp, r.ray.o, ray, weight, random) : 1;
+  }
+
+  const SceneView& scene_;
+  const Rays& rays_;
+  View<TabledLamp> lamps_;
+};
+
+}  // namespace virga

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "transport/media_walk.h"
+#include "volume/lookup_along.h"
+
+namespace virga {
+
+/// The medium's density is a dense grid of scalars with nothing around it, small enough for lookupAlong().
+VIRGA_HD inline bool isPlainGrid(const MediumView& medium) {
+  const GridView& grid = medium.density;
+  if (medium.homogeneous || grid.kind != GridView::Kind::dense || grid.background > 0) return false;
+  return !medium.densityColors.values && double{1} * grid.dense.nx * grid.dense.ny * grid.dense.nz < 2147483648.0;
+}
+
+/// The part of a ray between the first and the last coarse cell that holds anything.
+VIRGA_HD inline ClippedRange whereFilled(const MediumView& medium, const Ray& ray, float t0, float t1) {
+  const GridRay inGrid(medium, ray);
+  ClippedRange filled{t1, t0};
+  forEachMajorant(medium.density, inGrid.o, inGrid.d, t0, t1, [&](float a, float b, float majorant, bool) {
+    if (majorant > 0) filled.t0 = std::min(filled.t0, a), filled.t1 = b;
+    return true;
+  });
+  return filled;
+}
+
+/// Steps whose densities are looked up together.
+inline constexpr int kMarchedAtOnce = 32;
+
+/// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
+/// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
+/// returns false. Homogeneous media are exact, and a single step.
+template <class Visit>
+VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const Ray& ray, float t0, float t1, int steps,
+                         float shift, Visit&& visit) {
+  float begin = t1, end = t0, thickest = 0;
+  bool homogeneous = true;
+  for (int i = 0; i < media.count(); ++i) {
+    const MediumView& medium = scene.media[media.medium(i)];
+    homogeneous &= medium.homogeneous;
+    thickest = std::max(thickest, medium.sigmaT);
+    ClippedRange in{t0, t1};
+    if (!medium.homogeneous && !(medium.density.background > 0))
+      in = clipToBox(medium.worldToDensity.point(ray.o), medium.worldToDensity.vector(ray.d), medium.density.supportLo,
+                     medium.density.supportHi, t0, t1);
+    if (!(in.t0 < in.t1)) continue;
+    begin = std::min(begin, in.t0), end = std::max(end, in.t1);
+  }
+  if (!(begin < end) || !(thickest > 0)) return true;
+  // A stretch without end is dark beyond so many mean free paths.
+  if (std::isinf(end)) end = begin + 40 / thickest;
+  if (homogeneous) steps = 1, shift = 0;
+  const float step = (end - begin) / static_cast<float>(steps);
+  const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
+  const MediumView& first = scene.media[media.medium(0)];
+  if (media.count() == 1 && isPlainGrid(first)) {
+    const ClippedRange filled = whereFilled(first, ray, begin, end);
+    if (!(filled.t0 < filled.t1)) return true;
+    // Step n goes from n - shift to n + 1 - shift; the same steps as without this, but those that are empty.
+    const int from = std::max(0, static_cast<int>((filled.t0 - begin) / step + shift - 0.01f));
+    const int to = std::min(steps, static_cast<int>((filled.t1 - begin) / step + shift + 0.01f));
+    float density[kMarchedAtOnce];
+    for (int n0 = from; n0 <= to; n0 += kMarchedAtOnce) {
+      const int count = std::min(kMarchedAtOnce, to + 1 - n0);
+      // The first step and the last may be cut: their middles are off by less than half a step.
+      const GridRay inGrid(first, {ray.at(begin + step * (static_cast<float>(n0) + 0.5f - shift)), ray.d * step});
+      lookupAlong(first.density, inGrid.o, inGrid.d, count, density);
+      for (int n = 0; n < count; ++n) {
+        const float a = border(n0 + n), b = std::min(end, border(n0 + n + 1));
+        if (a < b && !visit(a, b, first.spectrum * (first.sigmaT * density[n] * (b - a)))) return false;
+      }
+    }
+    return true;
+  }
+  for (int n = 0; n <= steps; ++n) {
+    const float a = border(n), b = std::min(end, border(n + 1));
+    if (!(a < b)) continue;
+    const Vec3 p = ray.at(0.5f * (a + b));
+    Rgb sigmaT;
+    for (int i = 0; i < media.count(); ++i) sigmaT += scene.media[media.medium(i)].sigmaTAt(p);
+    if (!visit(a, b, sigmaT * (b - a))) return false;
+  }
+  return true;
+}
+
+/// Of an optical depth. Mostly it is grey, and one exponential does.
+VIRGA_HD inline Rgb transmittanceOf(Rgb depth) { return isGrey(depth) ? Rgb(std::exp(-depth.r)) : exp(depth * -1); }
+
+/// Transmittance along a ray by marching; null boundaries are passed, surfaces are not looked at.
+template <class Rays>
+VIRGA_HD Rgb marchedTransmittance(const SceneView& scene, const Rays& rays, MediaRay r, float tMax, int steps,
+                                  float shift) {
+  Rgb depth;
+  walkMedia(scene, rays, r, tMax, [&](float t0, float t1) {
+    return marchMedia(scene, r.media, r.ray, t0, t1, steps, shift, [&](float, float, Rgb here) {
+      depth += here;
+      return true;
+    });
+  });
+  return transmittanceOf(depth);
+}
+
+}  // namespace virga
