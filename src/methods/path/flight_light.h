@@ -52,16 +52,6 @@ class FlightLight {
     return c;
   }
 
-  /// Unbiased estimate of transmittance times visibility between a lamp with a table and x, where `r` starts or a
-  /// little beside of which it does. The result is to count `weight` times.
-  VIRGA_HD float seen(int emitter, const MediaRay& r, Vec3 x, float weight, Pcg32& random) const {
-    const TabledLamp& lamp = lamps_[emitter];
-    const ConnectingRay ray = aimAt(scene_, r, lamp.table.p);
-    if (!(ray.tMax > 0)) return 1;
-    if (rays_.occluded(ray.at.ray, ray.tMax)) return 0;
-    return estimateTransmittance(scene_, rays_, lamp, x, ray, weight, random);
-  }
-
  private:
   VIRGA_HD void gather(const MediaRay& r, float t, int medium, float ratio, Gathered& gathered, Pcg32& random) const {
     const Vec3 x = r.ray.at(t), wo = -r.ray.d;
@@ -69,17 +59,18 @@ class FlightLight {
     const LightSample light = towardPoint(emitter, x, {emitter.position, {}, 1, true});
     if (!(light.pdf > 0) || isBlack(light.radiance)) return;
     const MediumView& here = scene_.media[medium];
-    const float phase = here.phaseBlends.size == 0 ? here.phase.value(wo, light.wi) : here.phaseAt(x).value(wo, light.wi);
+    const float phase =
+        here.phaseBlends.size == 0 ? here.phase.value(wo, light.wi) : here.phaseAt(x).value(wo, light.wi);
     const float scattered = ratio * phase / (gathered.choice * light.pdf);
-    const float seen = seenFromMedium(gathered, {{x, light.wi}, r.media, 0}, ratio, random);
-    gathered.light += here.albedoAt(x) * light.radiance * (scattered * seen);
+    const float visible = seen(lamps_[gathered.emitter], {{x, light.wi}, r.media, 0}, ratio * gathered.weight, random);
+    gathered.light += here.albedoAt(x) * light.radiance * (scattered * visible);
   }
-  VIRGA_HD float seenFromMedium(const Gathered& gathered, const MediaRay& r, float ratio, Pcg32& random) const {
-    const TabledLamp& lamp = lamps_[gathered.emitter];
-    const float weight = ratio * gathered.weight;
-    if (!lamp.clear) return seen(gathered.emitter, r, r.ray.o, weight, random);
+  /// Transmittance times visibility from where `r` starts to the lamp, to count `weight` times.
+  VIRGA_HD float seen(const TabledLamp& lamp, const MediaRay& r, float weight, Pcg32& random) const {
     const ConnectingRay ray = aimAt(scene_, r, lamp.table.p);
-    return ray.tMax > 0 ? estimateTransmittance(scene_, rays_, lamp, r.ray.o, ray, weight, random) : 1;
+    if (!(ray.tMax > 0)) return 1;
+    if (!lamp.clear && rays_.occluded(ray.at.ray, ray.tMax)) return 0;
+    return estimateTransmittance(scene_, rays_, lamp, r.ray.o, ray, weight, random);
   }
 
   const SceneView& scene_;
