@@ -3,9 +3,9 @@
 
 #include "core/sampler.h"
 #include "image/layers.h"
+#include "methods/path/flight_light.h"
 #include "transport/equiangular.h"
 #include "transport/lamp_guide.h"
-#include "transport/tabled_lamps.h"
 #include "transport/vertex.h"
 
 namespace virga {
@@ -60,6 +60,7 @@ struct EyePath {
   float bound = 0;               ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
   Link link;
   bool lightsX1 = true;           ///< lamps are connected at x1, too; no: somebody else finds their light there
+  EmitterChoice choice;           ///< of the light at the next vertex in a medium, where it is made before the flight
   LampGuide lamp;                 ///< of the last vertex, for technique B on the next segment
   float promise = 1, before = 1;  ///< LampGuide::promise of the last direction and of the one before
 

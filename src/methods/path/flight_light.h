@@ -5,14 +5,21 @@
 
 namespace virga {
 
+/// One of the scene's emitters, drawn at random.
+struct EmitterChoice {
+  int emitter = -1;
+  float probability = 0;
+
+  VIRGA_HD bool drawn() const { return emitter >= 0; }
+};
+
 /// What a free flight gathers of a lamp's light on its way.
 struct Gathered {
-  int emitter = -1;  ///< the lamp; -1: nothing is gathered
-  float choice = 0;  ///< its probability
-  float weight = 0;  ///< largest channel of the path's throughput
-  Rgb light;         ///< so far, without the throughput [W/(m^2 sr)]
+  EmitterChoice lamp;  ///< none: nothing is gathered
+  float weight = 0;    ///< largest channel of the path's throughput
+  Rgb light;           ///< so far, without the throughput [W/(m^2 sr)]
 
-  VIRGA_HD bool active() const { return emitter >= 0; }
+  VIRGA_HD bool active() const { return lamp.drawn(); }
 };
 
 /// Light from lamps with tables, by an expected value in place of a sample: at *all* tentative collisions of a free
@@ -29,11 +36,10 @@ class FlightLight {
   /// Is the light of this emitter gathered along flights?
   VIRGA_HD bool has(int emitter) const { return any() && lamps_[emitter].present(); }
 
-  /// Begins to gather for a flight: `u` in [0, 1) chooses the lamp.
-  VIRGA_HD Gathered begin(Rgb throughput, float u) const {
-    const auto choice = scene_.emitterChoice.sample(u);
-    if (!has(choice.index)) return {};
-    return {choice.index, choice.probability, maxComponent(throughput), {}};
+  /// Begins to gather the light of an emitter, if that has a table.
+  VIRGA_HD Gathered begin(const EmitterChoice& choice, Rgb throughput) const {
+    if (!has(choice.emitter)) return {};
+    return {choice, maxComponent(throughput), {}};
   }
 
   /// The first real collision within [t0, t1], as sampleCollision() finds it; adds to what is gathered.
@@ -55,14 +61,15 @@ class FlightLight {
  private:
   VIRGA_HD void gather(const MediaRay& r, float t, int medium, float ratio, Gathered& gathered, Pcg32& random) const {
     const Vec3 x = r.ray.at(t), wo = -r.ray.d;
-    const EmitterView& emitter = scene_.emitters[gathered.emitter];
+    const EmitterView& emitter = scene_.emitters[gathered.lamp.emitter];
     const LightSample light = towardPoint(emitter, x, {emitter.position, {}, 1, true});
     if (!(light.pdf > 0) || isBlack(light.radiance)) return;
     const MediumView& here = scene_.media[medium];
     const float phase =
         here.phaseBlends.size == 0 ? here.phase.value(wo, light.wi) : here.phaseAt(x).value(wo, light.wi);
-    const float scattered = ratio * phase / (gathered.choice * light.pdf);
-    const float visible = seen(lamps_[gathered.emitter], {{x, light.wi}, r.media, 0}, ratio * gathered.weight, random);
+    const float scattered = ratio * phase / (gathered.lamp.probability * light.pdf);
+    const float visible =
+        seen(lamps_[gathered.lamp.emitter], {{x, light.wi}, r.media, 0}, ratio * gathered.weight, random);
     gathered.light += here.albedoAt(x) * light.radiance * (scattered * visible);
   }
   /// Transmittance times visibility from where `r` starts to the lamp, to count `weight` times.

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "methods/path/eye_path.h"
-#include "methods/path/flight_light.h"
 
 namespace virga {
 
@@ -72,10 +71,12 @@ class LightTechniques {
     path.addMet(emitter.radianceAt(lightUv(shape, emitter, point.p, hit.primitive, {hit.u, hit.v})) * w);
   }
 
-  /// Before a flight to a vertex in a medium.
-  VIRGA_HD Gathered beginFlight(const Path& path, Sampler& sampler) const {
+  /// Before a flight to a vertex in a medium: the light that is looked for there is chosen now, if a flight may gather
+  /// its light. (Two choices, one for flights and one at vertices, would leave more noise.)
+  VIRGA_HD Gathered beginFlight(Path& path, Sampler& sampler) const {
     if (!flightLight_.any() || !hasLights()) return {};
-    return flightLight_.begin(path.throughput, path.one(sampler));
+    path.choice = chooseEmitter(path, sampler);
+    return flightLight_.begin(path.choice, path.throughput);
   }
   VIRGA_HD const FlightLight<Rays>& flightLight() const { return flightLight_; }
   /// Light that a free flight has gathered on its way to a vertex in a medium.
@@ -126,8 +127,10 @@ class LightTechniques {
   VIRGA_HD void connectMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
                               Sampler& sampler) const {
     if (!connectsHere(path)) return;
-    const Connection c = sampleConnection(path, x, sampler);
-    if (!(c.light.pdf > 0) || isBlack(c.light.radiance) || flightLight_.has(c.emitter)) return;
+    const EmitterChoice choice = path.choice.drawn() ? path.choice : chooseEmitter(path, sampler);
+    if (flightLight_.has(choice.emitter)) return;
+    const Connection c = sampleConnection(path, x, choice, sampler);
+    if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const float own = c.choice * c.light.pdf;
     const float phasePdf = c.light.delta ? 0 : phase.pdf(wo, c.light.wi);
     float w = weight(own, phasePdf);
@@ -148,7 +151,7 @@ class LightTechniques {
                                Sampler& sampler) const {
     if (!connectsHere(path)) return;
     path.last.segment = {};
-    const Connection c = sampleConnection(path, point.p, sampler);
+    const Connection c = sampleConnection(path, point.p, chooseEmitter(path, sampler), sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const Vec3 wi = side.frame.toLocal(c.light.wi);
     const Rgb value = side.leaks(c.light.wi, wi) ? Rgb() : side.bsdf->value(side.wo, wi);
@@ -209,19 +212,22 @@ class LightTechniques {
   };
 
   /// Nothing for lights that technique B finds by itself on the segment to x.
-  VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, Sampler& sampler) const {
-    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
-    const EmitterView& emitter = scene_.emitters[choice.index];
+  VIRGA_HD Connection sampleConnection(const Path& path, Vec3 x, const EmitterChoice& choice, Sampler& sampler) const {
+    const EmitterView& emitter = scene_.emitters[choice.emitter];
     if (path.last.segment.replacesFlights(emitter)) return {};
-    return {sampleLight(scene_, emitter, x, path.pair(sampler)), choice.index, choice.probability};
+    return {sampleLight(scene_, emitter, x, path.pair(sampler)), choice.emitter, choice.probability};
+  }
+  VIRGA_HD EmitterChoice chooseEmitter(const Path& path, Sampler& sampler) const {
+    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
+    return {choice.index, choice.probability};
   }
 
   VIRGA_HD LampGuide drawLamp(const Path& path, Sampler& sampler) const {
-    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
-    const EmitterView& emitter = scene_.emitters[choice.index];
+    const EmitterChoice choice = chooseEmitter(path, sampler);
+    const EmitterView& emitter = scene_.emitters[choice.emitter];
     const Vec2 u = path.pair(sampler);
     LampGuide lamp;
-    lamp.emitter = choice.index, lamp.choice = choice.probability;
+    lamp.emitter = choice.emitter, lamp.choice = choice.probability;
     if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
     return lamp;
   }
