@@ -96,7 +96,8 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
 Bounds filledBounds(const Scene& scene) {
   Bounds bounds;
   for (const MediumView& medium : scene.view.media) extendByGrid(medium, bounds);
-  const Bounds within = whereMediaMayBe(scene);
+  if (!mediaAreBounded(scene)) return bounds;
+  const Bounds within = scene.boundaryRays->bounds();
   return {max(bounds.lo, within.lo), min(bounds.hi, within.hi)};
 }
 

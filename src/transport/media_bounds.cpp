@@ -24,13 +24,23 @@ void visitStretches(const SceneView& view, const EmbreeRays& rays, MediaRay r, f
   });
 }
 
-}  // namespace
-
+/// Where boundaries say that media may be; everywhere, if there are media outside of them.
 Bounds whereMediaMayBe(const Scene& scene) {
   const bool within =
       endlessMedium(scene) == MediaState::kNone && std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
                                                                 [](const ShapeView& s) { return s.media.declared(); });
   return within ? scene.boundaryRays->bounds() : scene.view.bounds;
+}
+
+}  // namespace
+
+bool mediaAreBounded(const Scene& scene) {
+  const SceneView& view = scene.view;
+  return view.cameraMedia.base() == MediaState::kNone &&
+         std::none_of(view.surfaces.begin(), view.surfaces.end(),
+                      [](const ShapeView& s) { return s.media.declared(); }) &&
+         std::all_of(view.boundaries.begin(), view.boundaries.end(),
+                     [](const MediumTransition& t) { return t.closed; });
 }
 
 Bounds boundsOfMedia(const Scene& scene) {

@@ -5,8 +5,8 @@
 
 namespace virga {
 
-/// Where boundaries say that media may be; everywhere, if there are media outside of them.
-Bounds whereMediaMayBe(const Scene& scene);
+/// Are all media within closed boundaries, wherever the camera is?
+bool mediaAreBounded(const Scene& scene);
 /// All of the scene that holds media, as far as rays from a few points tell: where grids hold nothing there are none.
 /// Empty if there are no media.
 Bounds boundsOfMedia(const Scene& scene);

@@ -8,13 +8,15 @@
 namespace virga {
 namespace {
 
-/// Points at which a table is held against the truth before it is used.
-constexpr int kTrials = 1024;
-/// Checks are as frequent as errors are large: that is the best for a given cost. The factor was found by rendering.
-constexpr float kChecksPerError = 2, kFewestChecks = 0.01f;
+/// Points at which a table is held against the truth before it is used, and how many are tried to find them.
+constexpr size_t kPoints = 512;
+constexpr int kMostTrials = 1 << 16;
+/// Checks are as frequent as errors are large, beside the light itself: that is the best for a given cost. The factor
+/// was found by rendering.
+constexpr float kChecksPerError = 0.75f, kFewestChecks = 0.01f;
 /// A check takes as many steps as there are voxels on the way. Beyond so many steps for each look-up shadow rays are
 /// the better choice.
-constexpr float kMostSteps = 24, kMostChecks = 0.5f;
+constexpr float kMostSteps = 24, kMostChecks = 0.3f;
 
 /// A coarse cell of a medium's grid that is not empty.
 struct FilledCell {
@@ -39,35 +41,38 @@ std::vector<FilledCell> filledCells(const SceneView& scene) {
 }
 
 /// Points in the media, in each filled cell alike often and in proportion to the density.
-std::vector<Vec3> trialPoints(const SceneView& scene) {
+std::vector<Vec3> pointsInMedia(const SceneView& scene) {
   const std::vector<FilledCell> cells = filledCells(scene);
   std::vector<Vec3> points;
   if (cells.empty()) return points;
+  std::vector<Affine> toWorld;
+  for (const MediumView& medium : scene.media) toWorld.push_back(medium.worldToDensity.inverse());
   Pcg32 random(1);
   const auto one = [&] { return random.next(); };
-  for (int n = 0; n < kTrials; ++n) {
+  for (int n = 0; n < kMostTrials && points.size() < kPoints; ++n) {
     const auto index = static_cast<size_t>(one() * static_cast<float>(cells.size()));
     const FilledCell& cell = cells[std::min(index, cells.size() - 1)];
     const MediumView& medium = scene.media[cell.medium];
-    const Vec3 size = medium.density.majorant.cellSize;
-    const Vec3 q = cell.lo + size * Vec3(one(), one(), one());
-    if (one() * cell.majorant < medium.density.lookup(q)) points.push_back(medium.worldToDensity.inverse().point(q));
+    const Vec3 q = cell.lo + medium.density.majorant.cellSize * Vec3(one(), one(), one());
+    if (one() * cell.majorant < medium.density.lookup(q))
+      points.push_back(toWorld[static_cast<size_t>(cell.medium)].point(q));
   }
   return points;
 }
 
-/// Root mean square of what a table's transmittances are off by.
+/// What a table's transmittances are off by, relative to these (root mean squares of both): the noise of checks
+/// competes with that of the light that arrives. Infinite where nothing tells.
 float errorOf(const Scene& scene, const LampTable& table, const std::vector<Vec3>& points, const MediaState& media) {
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  double sum = 0;
+  float off = 0, light = 0;
   for (const Vec3 x : points) {
     const float d = distance(table.p, x);
     if (!(d > 0)) continue;
     const float exact = std::exp(-opticalDepth(scene.view, rays, {{table.p, (x - table.p) / d}, media, 0}, d).r);
-    const float off = exact - std::exp(-table.depthTo(x).r);
-    sum += static_cast<double>(off * off);
+    off += square(exact - std::exp(-table.depthTo(x).r));
+    light += square(exact);
   }
-  return static_cast<float>(std::sqrt(sum / static_cast<double>(std::max<size_t>(1, points.size()))));
+  return light > 0 ? std::sqrt(off / light) : kInfinity;
 }
 
 /// Is no surface in the way of a lamp's light to any point within the media's bounds?
@@ -88,11 +93,11 @@ float mostVoxels(const SceneView& scene) {
 
 TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& stop) {
   const SceneView& view = scene.view;
-  if (view.chromatic) return;
+  if (view.chromatic || side == 0) return;
   tables_ = LampTables(scene, side, stop);
   if (tables_.view().size == 0 || stop.stop_requested()) return;
   const Bounds media = filledBounds(scene);
-  const std::vector<Vec3> points = trialPoints(view);
+  const std::vector<Vec3> points = pointsInMedia(view);
   const int endless = endlessMedium(scene);
   const float voxels = mostVoxels(view);
   lamps_.resize(static_cast<size_t>(view.emitters.size));
@@ -104,17 +109,20 @@ TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& st
     if (checks > kMostChecks || checks * voxels > kMostSteps) continue;
     lamps_[static_cast<size_t>(i)] = {table, checks, isClear(*scene.surfaceRays, table.p, media)};
   }
+  if (std::none_of(lamps_.begin(), lamps_.end(), [](const TabledLamp& lamp) { return lamp.present(); })) lamps_.clear();
 }
 
-int tabledLampSide(const SceneView& scene) {
+int tabledLampSide(const SceneView& scene, int64_t pixels) {
   if (scene.chromatic || scene.thinGlass) return 0;
   size_t voxels = 0;
   for (const MediumView& medium : scene.media) {
     const Vec3 size = medium.density.supportHi - medium.density.supportLo;
     voxels += static_cast<size_t>(double{size.x} * double{size.y} * double{size.z});
   }
-  constexpr size_t kLeastBytes = 16 << 20;
-  const size_t most = std::max(kLeastBytes, voxels * sizeof(float) * 2 / 5);
+  // So many nodes take as long as a path or two.
+  constexpr size_t kLeastBytes = 16 << 20, kNodesPerPixel = 64;
+  const size_t most = std::min(std::max(kLeastBytes, voxels * sizeof(float) * 2 / 5),
+                               static_cast<size_t>(pixels) * kNodesPerPixel * sizeof(float));
   int side = lampTableSide(scene);
   while (side > LampTables::kLeastSide && lampTableBytes(scene, side) > most) side -= side / 8 + 1;
   return std::max(0, side);

@@ -36,11 +36,11 @@ VIRGA_HD float estimateTransmittance(const SceneView& scene, const Rays& rays, c
 class TabledLamps {
  public:
   TabledLamps() = default;
-  /// `side`: of each table (LampTables). A lamp whose table would have to be checked too often has none. None has where
-  /// extinction differs between the channels, and none while a stop is asked for.
+  /// `side`: of each table (LampTables); 0 for none. A lamp whose table would have to be checked too often has none.
+  /// None has where extinction differs between the channels, and none while a stop is asked for.
   TabledLamps(const Scene& scene, int side, const std::stop_token& stop);
 
-  /// One for each emitter, or none at all. Points into this object.
+  /// One for each emitter, or none at all if no lamp has a table. Points into this object.
   View<TabledLamp> view() const { return {lamps_.data(), static_cast<int>(lamps_.size())}; }
 
  private:
@@ -48,8 +48,8 @@ class TabledLamps {
   std::vector<TabledLamp> lamps_;
 };
 
-/// Nodes in either direction that do justice to the scene's grids and take less memory than a part of these. 0 where
-/// there can be no tables.
-int tabledLampSide(const SceneView& scene);
+/// Nodes in either direction that do justice to the scene's grids, but take little memory beside dense ones and little
+/// time beside a picture of so many pixels. 0 where there can be no tables.
+int tabledLampSide(const SceneView& scene, int64_t pixels);
 
 }  // namespace virga

@@ -15,6 +15,8 @@ namespace {
 
 using namespace virga::testing;
 
+constexpr int64_t kManyPixels = 1 << 20;
+
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   const size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
@@ -91,7 +93,7 @@ TEST(TabledLamps, WorseTablesAreCheckedMoreOftenAndTheWorstAreNotUsed) {
     const TabledLamps lamps(*scene, side, {});
     return lamps.view().size > 0 && lamps.view()[0].present() ? lamps.view()[0].checks : 1.f;
   };
-  const float usual = checks(tabledLampSide(scene->view));
+  const float usual = checks(tabledLampSide(scene->view, kManyPixels));
   EXPECT_LT(usual, 0.08f);
   EXPECT_GT(checks(24), 1.5f * usual);
   EXPECT_EQ(checks(2), 1) << "no table";
@@ -119,16 +121,19 @@ TEST(TabledLamps, AreNotWhereTheyCannotBe) {
   const auto side = [](const std::string& elements) {
     const SceneSnapshot scene = sceneOf(elements);
     EXPECT_EQ(TabledLamps(*scene, 40, {}).view().size, 0);
-    return tabledLampSide(scene->view);
+    EXPECT_EQ(TabledLamps(*scene, 0, {}).view().size, 0);
+    return tabledLampSide(scene->view, kManyPixels);
   };
   EXPECT_EQ(side(fog(8) + point(R"(x="0" y="0" z="0")", 1)), 0);
   EXPECT_EQ(side(replaced(plume(8), R"(<float name="scale" value="12"/>)", R"(<rgb name="scale" value="12, 4, 8"/>)")),
             0);
 }
 
-TEST(TabledLamps, TakeLittleMemory) {
+TEST(TabledLamps, AreSmallBesideThePicture) {
   const SceneSnapshot scene = sceneOf(plume(8));
-  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(scene->view)), size_t{16} << 20);
+  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(scene->view, 100)), size_t{100 * 64 * 4});
+  EXPECT_GT(tabledLampSide(scene->view, kManyPixels), 2 * tabledLampSide(scene->view, 100));
+  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(scene->view, kManyPixels)), size_t{16} << 20);
 }
 
 // --- pictures ---
@@ -169,11 +174,40 @@ TEST(FlightLight, EveryLayerOfShortPathsInSmokeThatOverlapsAndGlows) {
   expectSamePictures(glowing(overlapping(16)), denser(glowing(overlapping(16))));
 }
 
+double noise(const SceneSnapshot& scene, const SettingValues& settings) {
+  return rendered(scene, {.passes = 64, .settings = {settings.begin(), settings.end()}})
+      .film()
+      .estimatedRelMse()
+      .value();
+}
 TEST(FlightLight, LeavesLessNoise) {
-  const auto error = [](const char* table) {
-    return rendered(sceneOf(plume(24)), {.passes = 64, .settings = {{"lamp_table", table}}}).film().estimatedRelMse();
-  };
-  EXPECT_LT(error("72").value(), 0.85 * error("0").value());
+  const SceneSnapshot scene = sceneOf(plume(24));
+  EXPECT_LT(noise(scene, {{"lamp_table", "72"}}), 0.85 * noise(scene, {{"lamp_table", "0"}}));
+}
+// Deep inside of dense smoke a table is right without merit: it is dark there. What counts is its lit skin.
+TEST(FlightLight, IsNotNoisierInDenseSmokeWithSharpEdges) {
+  for (const char* scale : {"100", "400", "3000"}) {
+    const SceneSnapshot scene = sceneOf(replaced(plume(24), R"(<float name="scale" value="12"/>)",
+                                                 fmt::format(R"(<float name="scale" value="{}"/>)", scale)));
+    EXPECT_LT(noise(scene, {}), 1.2 * noise(scene, {{"lamp_table", "0"}})) << scale;
+  }
+}
+
+TEST(FlightLight, EveryLayerInSmokeAroundEverything) {
+  constexpr int passes = 320;
+  const SceneSnapshot scene = sceneOf(endlessPlume(16, 4) + kScreen);
+  const LayerMeans truth = pictures(scene, "0", 1, 2 * passes);
+  expectSameLayers(truth, pictures(scene, "72", 11, passes), "gathered");
+  EXPECT_GT(truth.layers[static_cast<size_t>(Layer::directMedia)][LayerMeans::kWhole].mean(), 1e-3);
+}
+TEST(FlightLight, TablesFollowACameraThatLeavesASmallCloudOfItsMedium) {
+  const SceneSnapshot inside = sceneOf(endlessPlume(16, 0.1)), outside = sceneOf(endlessPlume(16, 4));
+  ASSERT_NE(endlessMedium(*inside), endlessMedium(*outside));
+  RenderSession session(inside, findMethod("path"), {.settings = {.values = {}, .seed = 1}});
+  session.step();
+  session.edit(outside, {{{"camera", Aspect::camera}}});
+  session.step();
+  EXPECT_EQ(largestDifference(session.film().beauty(), rendered(outside, {.passes = 1}).film().beauty()), 0);
 }
 
 TEST(FlightLight, TablesFollowTheLampNotTheCamera) {
@@ -205,6 +239,7 @@ TEST(FlightLight, SettingsThatMakeNoSenseAreRefused) {
     }
   };
   EXPECT_EQ(messageOf(plume(8), "40"), "40");
+  EXPECT_EQ(messageOf(plume(8), "2"), "0") << "a table that is of no use";
   EXPECT_EQ(messageOf(fog(8), "40"), "0") << "there are no grids";
   EXPECT_TRUE(messageOf(plume(8), "1").starts_with("error: --set path.lamp_table may be 2 to 512, or 0"));
 }

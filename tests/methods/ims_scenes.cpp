@@ -27,20 +27,41 @@ struct SmokeFile {
   ~SmokeFile() { std::filesystem::remove(path); }
 };
 
+constexpr const char* kPlumeLamp =
+    R"(<emitter type="point"><point name="position" x="-2.5" y="3" z="1.5"/><rgb name="intensity" value="50"/></emitter>)";
+
+/// The plume's medium; `name`: an attribute.
+std::string smoke(const char* name) {
+  static const SmokeFile file;
+  return fmt::format(
+      R"(<medium {} type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
+        <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
+        <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium>)",
+      name, file.path.string());
+}
+
 }  // namespace
 
 std::string plume(int size, float x) {
-  static const SmokeFile file;
-  return sensor(size, x) + fmt::format(R"(
-    <emitter type="point"><point name="position" x="-2.5" y="3" z="1.5"/><rgb name="intensity" value="50"/></emitter>
+  return sensor(size, x) + kPlumeLamp + R"(
     <shape type="rectangle"><transform name="to_world"><scale value="6"/><rotate x="1" angle="-90"/><translate y="-1"/></transform>
       <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf></shape>
     <shape type="cube"><transform name="to_world"><scale value="0.3"/><translate x="1.2" y="-0.7" z="0.6"/></transform></shape>
     <shape type="cube"><transform name="to_world"><scale value="0.95"/></transform><bsdf type="null"/>
-      <medium name="interior" type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
-        <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
-        <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium></shape>)",
-                                       file.path.string());
+      )" +
+         smoke(R"(name="interior")") + "</shape>";
+}
+
+std::string endlessPlume(int size, double z) {
+  return smoke(R"(id="smoke")") +
+         fmt::format(R"(<sensor type="perspective"><float name="fov" value="40"/><ref name="medium" id="smoke"/>
+    <transform name="to_world"><lookat origin="0, 0, {1}" target="0, -0.1, 0" up="0, 1, 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="{0}"/><integer name="height" value="{0}"/><rfilter type="box"/></film>
+    </sensor>)",
+                     size, z) +
+         kPlumeLamp +
+         R"(<shape type="cube"><transform name="to_world"><scale value="0.2"/></transform><bsdf type="null"/>
+    <ref name="interior" id="smoke"/></shape>)";
 }
 
 std::string fog(int size, const std::string& bsdf, float x) {

@@ -10,6 +10,10 @@ namespace virga::testing {
 /// A plume over a floor, beside a block, under a point light.
 std::string plume(int size, float x = 0);
 
+/// Its smoke declared by the sensor, whose camera is at z on the axis, and by a small cube in the middle: it is around
+/// everything unless the camera is in the cube. Without floor and block.
+std::string endlessPlume(int size, double z);
+
 /// Fog in a room with a lamp on the ceiling and a ball of `bsdf`.
 std::string fog(int size, const std::string& bsdf = R"(<bsdf type="diffuse"/>)", float x = 0);
 

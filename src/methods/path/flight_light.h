@@ -47,7 +47,10 @@ class FlightLight {
     if (r.media.count() == 1) {
       const int index = r.media.medium(0);
       const auto met = [&](float t, float ratio) {
-        if (ratio > 0) gather(r, t, index, ratio, gathered, random);
+        // Collisions that are hardly real are not worth a look-up each.
+        constexpr float kLeast = 0.1f;
+        if (ratio >= kLeast || random.next() * kLeast < ratio)
+          gather(r, t, index, std::max(ratio, kLeast), gathered, random);
       };
       const float t = trackFreeFlight(scene_.media[index], r.ray, t0, t1, random, met);
       return t < t1 ? Collision{t, index} : Collision{};

@@ -5,6 +5,7 @@
 #include "methods/path/path_pixels.h"
 #include "methods/pixels.h"
 #include "methods/settings_reader.h"
+#include "transport/virtual_lights.h"
 
 namespace virga {
 namespace {
@@ -21,12 +22,14 @@ class PathMethod final : public Method {
     lampTable_ = LampTableSetting(reader, "path");
     seed_ = settings.seed;
     tables_.reset();
-    tableSide();  // throws where tables would be too large
+    tableSide();
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
+    // Where the camera is says which medium is around everything.
+    if (!changes.cameraAlone() || endlessMedium(*scene_) != endlessMedium(*next)) tables_.reset();
     scene_ = std::move(next);
-    if (!changes.cameraAlone()) tables_.reset();
+    tableSide();
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -36,7 +39,7 @@ class PathMethod final : public Method {
             {"rr_depth", std::to_string(options.rrDepth)},
             {"equiangular_depth", std::to_string(options.equiangularDepth)},
             {"shared_paths", sharesPaths() ? "true" : "false"},
-            {"lamp_table", std::to_string(tableSide())}};
+            {"lamp_table", std::to_string(tables_ && tables_->view().size == 0 ? 0 : tableSide())}};
   }
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
@@ -73,8 +76,11 @@ class PathMethod final : public Method {
     return sharedPaths_ && SharedPaths<EmbreeRays>::possible(scene_->view, optionsForScene());
   }
 
-  /// 0: light is not looked up.
-  int tableSide() const { return lampTable_.nodes(scene_->view, tabledLampSide(scene_->view)); }
+  /// Throws where tables would be too large.
+  int tableSide() const {
+    const int64_t pixels = int64_t{scene_->camera.filmWidth} * scene_->camera.filmHeight;
+    return lampTable_.nodes(scene_->view, tabledLampSide(scene_->view, pixels));
+  }
 
   SceneSnapshot scene_;
   std::unique_ptr<TabledLamps> tables_;  ///< of this scene, once a pass has asked for them
