@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compiled with -ffast-math (CMakeLists.txt): without it no loop with an exponential becomes vector code.
-#include "methods/instant_scattering/lamp_kernels.h"
+#include "methods/instant_scattering/eye_kernels.h"
 #include "scene/shape.h"
 
 namespace virga {
@@ -84,6 +84,20 @@ void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scal
   alignas(64) float most[RayPacket::kSize];
   for (int i = 0; i < RayPacket::kSize; ++i) most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
   aimFromMedia(lamp, at, most, scale, rays);
+}
+
+void marchEyes(const KernelGrid& grid, KernelEyes& eyes, KernelDepths& depths) { kernels::march(grid, eyes, depths); }
+
+void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place, EyePoints& at) {
+  kernels::pointsAt(eyes, depths, place, at);
+}
+
+void lightEyes(const LampPoint& lamp, const KernelEyes& eyes, const EyePoints& at, float anisotropy, float scale,
+               float* value, RayPacket& rays) {
+  kernels::lampAtPoints(lamp, eyes, at, anisotropy, value);
+  for (int i = 0; i < RayPacket::kSize; ++i)
+    value[i] = at.weight[0][i] + at.weight[1][i] + at.weight[2][i] > 0 ? value[i] : 0.f;
+  aimFromMedia(lamp, at, value, scale, rays);
 }
 
 }  // namespace virga

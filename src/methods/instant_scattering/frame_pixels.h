@@ -36,6 +36,7 @@ class FramePixels {
     size_t count = 0;
     std::vector<MarchedEye> eyes = std::vector<MarchedEye>(kSize);  ///< room for them
     std::array<PixelFeatures, kSize> features;                      ///< what is seen
+    EyePacket smoke;                                                ///< what of them goes side by side
     std::array<LayerRadiance, kSize> radiance;                      ///< light of x1 straight from lamps
   };
   /// Fills eyes, features and radiance. No light is found where an eye is not plain: where a mirror, glass or a narrow
@@ -46,6 +47,8 @@ class FramePixels {
   std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;
 
  private:
+  /// Fills eye number i of a block, or leaves its media to the block's packet.
+  void meet(Block& block, size_t i, const CameraRay& camera, const RayHit& hit) const;
   /// The points of a pixel's eye ray that are lit.
   template <class Visit>
   void visitReceivers(const MarchedEye& eye, Visit&& visit) const;

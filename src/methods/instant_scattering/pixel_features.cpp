@@ -35,13 +35,15 @@ Rgb reflectanceOf(const Side& side) {
 
 }  // namespace
 
-PixelFeatures pixelFeatures(const MarchedEye& eye) {
+PixelFeatures pixelFeatures(const MarchedEye& eye) { return pixelFeatures(eye, meanDepth(eye)); }
+
+PixelFeatures pixelFeatures(const MarchedEye& eye, float mediaDepth) {
   PixelFeatures f;
   f.regular = true;
   f.depth = eye.hit.found() ? eye.hit.t : kInfinity;
   const Rgb transmittance = transmittanceOf(eye.depth);
   f.opacity = Rgb(1.f) - transmittance;
-  f.mediaDepth = meanDepth(eye);
+  f.mediaDepth = mediaDepth;
   if (!eye.hit.found()) return f;
   f.regular = !eye.side.bsdf->specular() && !eye.side.bsdf->isThin();
   f.p = eye.point.p;
