@@ -78,6 +78,14 @@ void PassFrame::set(int x, int y, const LayerRadiance& radiance) {
     if (layers_.has(static_cast<Layer>(i))) planes_[plane++].at(x, y) = radiance.value[i];
 }
 
+void PassFrame::add(int x, int y, const LayerRadiance& radiance) {
+  if (!planes_[0].pixels.empty())
+    for (const Rgb& value : radiance.value) planes_[0].at(x, y) += value;
+  size_t plane = 1;
+  for (int i = 0; i < kLayerCount; ++i)
+    if (layers_.has(static_cast<Layer>(i))) planes_[plane++].at(x, y) += radiance.value[i];
+}
+
 // ---- Film: the passes -----------------------------------------------------------------------------------------------
 
 Film::Film(int width, int height, LayerMask layers) : frame_(width, height, layers) {}
