@@ -97,7 +97,7 @@ VIRGA_HD static inline void march(const KernelGrid& grid, KernelEyes& e, KernelD
       const bool within = (n >= e.first[i]) & (n <= e.last[i]) & (d.total[i] <= e.thick);
       const float own = within ? e.sigmaT * density[i] * std::fmax(b - a, 0.f) : 0.f;
       before[i] = d.total[i];
-      const float depth = before[i] + own, after = std::exp(-mean * depth), seen = passed[i] - after;
+      const float depth = before[i] + own, after = falling(mean * depth), seen = passed[i] - after;
       // Mean of t in [0, 1] by exp(-m t): 1 / m - 1 / (exp(m) - 1), or its series up to an error of 4e-5.
       const float m = mean * own;
       const float series = 0.5f - m / 12 + m * m * m / 720, exact = 1 / (m + 1e-20f) - after / (seen + 1e-20f);

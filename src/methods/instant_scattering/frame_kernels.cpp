@@ -6,24 +6,21 @@
 namespace virga {
 namespace {
 
-template <EndKind light, EndKind receiver>
-void gatherBy(const KernelLight& l, const KernelReceivers& to, const float* const seen[3], const NearField& near) {
-  if (near.kind == NearField::Kind::clamped)
-    kernels::gather<light, receiver, NearField::Kind::clamped>(l, to, seen[0], seen[1], seen[2], near.bound);
-  else
-    kernels::gather<light, receiver, NearField::Kind::spread>(l, to, seen[0], seen[1], seen[2], near.bound);
-}
+template <EndKind kind>
+struct Kind {
+  static constexpr EndKind value = kind;
+};
 
-template <EndKind light>
-void gatherFrom(const KernelLight& l, const KernelReceivers& to, EndKind kind, const float* const seen[3],
-                const NearField& near) {
+/// body(Kind) for the kind.
+template <class Body>
+void withKind(EndKind kind, const Body& body) {
   switch (kind) {
     case EndKind::lambertian:
-      return gatherBy<light, EndKind::lambertian>(l, to, seen, near);
+      return body(Kind<EndKind::lambertian>());
     case EndKind::isotropic:
-      return gatherBy<light, EndKind::isotropic>(l, to, seen, near);
+      return body(Kind<EndKind::isotropic>());
     case EndKind::henyeyGreenstein:
-      return gatherBy<light, EndKind::henyeyGreenstein>(l, to, seen, near);
+      return body(Kind<EndKind::henyeyGreenstein>());
   }
 }
 
@@ -31,14 +28,26 @@ void gatherFrom(const KernelLight& l, const KernelReceivers& to, EndKind kind, c
 
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near) {
-  switch (from) {
-    case EndKind::lambertian:
-      return gatherFrom<EndKind::lambertian>(light, to, kind, seen, near);
-    case EndKind::isotropic:
-      return gatherFrom<EndKind::isotropic>(light, to, kind, seen, near);
-    case EndKind::henyeyGreenstein:
-      return gatherFrom<EndKind::henyeyGreenstein>(light, to, kind, seen, near);
-  }
+  withKind(from, [&](auto f) {
+    withKind(kind, [&](auto k) {
+      if (near.kind == NearField::Kind::clamped)
+        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seen[0], seen[1], seen[2], near.bound);
+      else
+        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seen[0], seen[1], seen[2], near.bound);
+    });
+  });
+}
+
+void gatherInFog(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, float sigmaT,
+                 const KernelShadowMap& map, const NearField& near) {
+  withKind(from, [&](auto f) {
+    withKind(kind, [&](auto k) {
+      if (near.kind == NearField::Kind::clamped)
+        kernels::gatherInFog<f.value, k.value, NearField::Kind::clamped>(light, to, sigmaT, map, near.bound);
+      else
+        kernels::gatherInFog<f.value, k.value, NearField::Kind::spread>(light, to, sigmaT, map, near.bound);
+    });
+  });
 }
 
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {

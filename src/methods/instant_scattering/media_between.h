@@ -26,6 +26,8 @@ class MediaBetween {
   MediaBetween(const Scene& scene, std::vector<Vec3> points, const Options& options, const std::stop_token& stop);
 
   Kind kind() const { return kind_; }
+  /// Extinction of the fog that is everywhere, for each channel [1/unit].
+  Rgb fog() const { return fog_; }
   /// From point number i to receivers, for each channel. `seen` points to three arrays of to.count values; on return
   /// the second and the third may be the same as the first.
   void look(size_t i, const KernelReceivers& to, float* seen[3]) const;
