@@ -78,12 +78,11 @@ void PassFrame::set(int x, int y, const LayerRadiance& radiance) {
     if (layers_.has(static_cast<Layer>(i))) planes_[plane++].at(x, y) = radiance.value[i];
 }
 
-void PassFrame::add(int x, int y, const LayerRadiance& radiance) {
-  if (!planes_[0].pixels.empty())
-    for (const Rgb& value : radiance.value) planes_[0].at(x, y) += value;
-  size_t plane = 1;
-  for (int i = 0; i < kLayerCount; ++i)
-    if (layers_.has(static_cast<Layer>(i))) planes_[plane++].at(x, y) += radiance.value[i];
+void PassFrame::add(int x, int y, Layer layer, Rgb radiance) {
+  if (!planes_[0].pixels.empty()) planes_[0].at(x, y) += radiance;
+  if (!layers_.has(layer)) return;
+  const uint32_t before = layers_.bits & ((1u << static_cast<int>(layer)) - 1);
+  planes_[1 + static_cast<size_t>(std::popcount(before))].at(x, y) += radiance;
 }
 
 // ---- Film: the passes -----------------------------------------------------------------------------------------------

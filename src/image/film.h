@@ -23,7 +23,7 @@ class PassFrame {
   /// Sets the pixel's value of this pass (a mean over the pass's samples in that pixel), in every plane.
   void set(int x, int y, const LayerRadiance& radiance);
   /// Adds to a pixel that this pass has set.
-  void add(int x, int y, const LayerRadiance& radiance);
+  void add(int x, int y, Layer layer, Rgb radiance);
 
  private:
   friend class Film;

@@ -21,7 +21,9 @@ class FastPass {
   void lookAndLight(std::span<PixelFeatures> features) {
     isLit_ = true;
     forEachPixel(frame_, stop_, [&](int x, int y) {
-      frame_.set(x, y, pixels_.sampleMiddle(x, y, of(x, y), features[numberOf(x, y)]));
+      LayerRadiance radiance = pixels_.sampleMiddle(x, y, of(x, y), features[numberOf(x, y)]);
+      radiance += pixels_.sampleGlow(x, y, of(x, y));
+      frame_.set(x, y, radiance);
     });
   }
 
@@ -42,11 +44,10 @@ class FastPass {
     return light;
   }
   void show(int x, int y, const Upsampling::Light& indirect) const {
-    LayerRadiance radiance;
-    indirect.addTo(radiance);
+    if (isLit_) return indirect.visit([&](Layer layer, Rgb radiance) { frame_.add(x, y, layer, radiance); });
+    LayerRadiance radiance = pixels_.sample(x, y, of(x, y), ImsPixels::Part::direct);
+    indirect.visit([&](Layer layer, Rgb more) { radiance.add(layer, more); });
     radiance += pixels_.sampleGlow(x, y, of(x, y));
-    if (isLit_) return frame_.add(x, y, radiance);
-    radiance += pixels_.sample(x, y, of(x, y), ImsPixels::Part::direct);
     frame_.set(x, y, radiance);
   }
   Upsampling::Light indirectLight(Upsampling::Pixel p) const {

@@ -44,9 +44,7 @@ class FramePass {
     lightDirectly(stop, features, frame);
     if (stop.stop_requested()) return false;
     const auto show = [&](int x, int y, const Upsampling::Light& indirect) {
-      LayerRadiance radiance;
-      indirect.addTo(radiance);
-      frame.add(x, y, radiance);
+      indirect.visit([&](Layer layer, Rgb radiance) { frame.add(x, y, layer, radiance); });
     };
     const Upsampling upsampling(features, frame.width(), frame.height(), options_.spacing);
     const std::vector<Upsampling::Pixel> others =

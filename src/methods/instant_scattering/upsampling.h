@@ -43,8 +43,11 @@ class Upsampling {
         media[l] += radiance.value[static_cast<int>(kInMedia[l])] * share;
       }
     }
-    void addTo(LayerRadiance& radiance) const {
-      for (size_t l = 0; l < 2; ++l) radiance.add(kOnSurface[l], surface[l]), radiance.add(kInMedia[l], media[l]);
+    /// add(layer, radiance).
+    template <class Add>
+    void visit(const Add& add) const {
+      for (size_t l = 0; l < 2; ++l) add(kOnSurface[l], surface[l]);
+      for (size_t l = 0; l < 2; ++l) add(kInMedia[l], media[l]);
     }
     static constexpr Layer kOnSurface[2] = {Layer::surfaceToSurface, Layer::mediaToSurface};
     static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
