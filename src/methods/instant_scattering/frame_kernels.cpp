@@ -38,16 +38,29 @@ void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& 
   });
 }
 
-void gatherInFog(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, float sigmaT,
-                 const KernelShadowMap& map, const NearField& near) {
+namespace {
+
+template <class Between>
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const Between& between, const KernelShadowMap& map, const NearField& near) {
   withKind(from, [&](auto f) {
     withKind(kind, [&](auto k) {
       if (near.kind == NearField::Kind::clamped)
-        kernels::gatherInFog<f.value, k.value, NearField::Kind::clamped>(light, to, sigmaT, map, near.bound);
+        kernels::gatherThrough<f.value, k.value, NearField::Kind::clamped>(light, to, between, map, near.bound);
       else
-        kernels::gatherInFog<f.value, k.value, NearField::Kind::spread>(light, to, sigmaT, map, near.bound);
+        kernels::gatherThrough<f.value, k.value, NearField::Kind::spread>(light, to, between, map, near.bound);
     });
   });
+}
+
+}  // namespace
+
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near) {
+  if (table)
+    gatherThrough(light, from, to, kind, kernels::TableBetween{*table}, map, near);
+  else
+    gatherThrough(light, from, to, kind, kernels::FogBetween{sigmaT}, map, near);
 }
 
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {

@@ -191,10 +191,51 @@ VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelRec
   }
 }
 
-/// gather() through a grey fog and the light's shadow map at once: most frames of fog spend their time here.
-template <EndKind light, EndKind receiver, NearField::Kind near>
-VIRGA_HD static inline void gatherInFog(const KernelLight& l, const KernelReceivers& to, float sigmaT,
-                                        const KernelShadowMap& map, float bound) {
+/// Optical depth that a point's table knows toward (x, y, z) from it, `inverse` over that distance.
+VIRGA_HD static inline float depthToward(const DepthTable& table, float x, float y, float z, float distance,
+                                         float inverse) {
+  const DepthView& f = table.view;
+  const float* __restrict depth = table.depth;
+  const float* __restrict right = depth + table.radii;
+  const float* __restrict below = depth + table.radii * table.side;
+  const float* __restrict across = below + table.radii;
+  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
+  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
+  const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
+  const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
+  const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
+  float u, v;
+  octahedral(a * turned, b * turned, c, u, v);
+  u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
+  const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
+  const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
+  const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
+  const auto radius = static_cast<float>(static_cast<int>(m));
+  const float fu = u - column, fv = v - row, fm = m - radius;
+  // In floats, which know all integers below 2^24: vector code multiplies them faster.
+  const int at = static_cast<int>((row * columns + column) * distances + radius);
+  const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
+  const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
+  const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
+  const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
+  return (d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv;
+}
+
+/// Multiplies `seen` by the transmittance that a point's table knows.
+VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
+                                             float* seen) {
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = to.px[i] - l.x, y = to.py[i] - l.y, z = to.pz[i] - l.z + 1e-10f;
+    const float distance = std::sqrt(x * x + y * y + z * z);
+    seen[i] *= falling(depthToward(table, x, y, z, distance, 1 / distance));
+  }
+}
+
+/// gather() through grey media and the light's shadow map at once: most frames spend their time here.
+template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
+VIRGA_HD static inline void gatherThrough(const KernelLight& l, const KernelReceivers& to, const Between between,
+                                          const KernelShadowMap map, float bound) {
   const float* __restrict px = to.px;
   const float* __restrict py = to.py;
   const float* __restrict pz = to.pz;
@@ -203,52 +244,33 @@ VIRGA_HD static inline void gatherInFog(const KernelLight& l, const KernelReceiv
   float* __restrict b = to.b;
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
-    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i];
+    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i] - 1e-10f;
     const float d2 = x * x + y * y + z * z + 1e-20f;
     const float inverse = 1 / std::sqrt(d2), distance = d2 * inverse;
     const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
     const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
-    const bool seen = reaches<receiver>(map, depthToward(map, -x, -y, 1e-10f - z), distance, cr);
-    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound) *
-                        (seen ? falling(sigmaT * distance) : 0.f);
+    const bool seen = reaches<receiver>(map, depthToward(map, -x, -y, -z), distance, cr);
+    const float through = falling(between.depth(-x, -y, -z, distance, inverse));
+    const float value =
+        connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound) * (seen ? through : 0.f);
     r[i] += value * l.r, g[i] += value * l.g, b[i] += value * l.b;
   }
 }
 
-/// Multiplies `seen` by the transmittance that a point's table knows.
-VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
-                                             float* seen) {
-  const float* __restrict depth = table.depth;
-  const float* __restrict right = depth + table.radii;
-  const float* __restrict below = depth + table.radii * table.side;
-  const float* __restrict across = below + table.radii;
-  const DepthView f = table.view;
-  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
-  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
-#pragma omp simd
-  for (int i = 0; i < to.count; ++i) {
-    const float x = to.px[i] - l.x, y = to.py[i] - l.y, z = to.pz[i] - l.z + 1e-10f;
-    const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / distance;
-    const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
-    const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
-    const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
-    float u, v;
-    octahedral(a * turned, b * turned, c, u, v);
-    u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
-    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
-    const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
-    const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
-    const auto radius = static_cast<float>(static_cast<int>(m));
-    const float fu = u - column, fv = v - row, fm = m - radius;
-    // In floats, which know all integers below 2^24: vector code multiplies them faster.
-    const int at = static_cast<int>((row * columns + column) * distances + radius);
-    const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
-    const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
-    const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
-    const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
-    seen[i] *= falling((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv);
+/// What lies between: a fog that is everywhere...
+struct FogBetween {
+  float sigmaT;
+
+  VIRGA_HD float depth(float, float, float, float distance, float) const { return sigmaT * distance; }
+};
+/// ...or what the light's table knows.
+struct TableBetween {
+  DepthTable table;
+
+  VIRGA_HD float depth(float x, float y, float z, float distance, float inverse) const {
+    return depthToward(table, x, y, z, distance, inverse);
   }
-}
+};
 
 }  // namespace kernels
 
@@ -257,9 +279,10 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
 /// Adds the light of `light` to all receivers, seen by `seen[channel]`, arrays of `to.count` transmittances.
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near);
-/// gatherLight() through a fog of sigmaT [1/unit] that is everywhere, and the light's shadow map.
-void gatherInFog(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, float sigmaT,
-                 const KernelShadowMap& map, const NearField& near);
+/// gatherLight() through the light's shadow map and what its table knows or, without one, a fog of sigmaT [1/unit] that
+/// is everywhere.
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near);
 /// exp(-sigmaT d) for each receiver.
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen);
 /// Multiplies `seen` by 1 or 0: what the light's shadow map says.

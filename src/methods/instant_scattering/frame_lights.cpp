@@ -145,9 +145,12 @@ KernelShadowMap FrameLights::mapOf(size_t i) const {
           ShadowMapsView::kLeastCosine};
 }
 
-bool FrameLights::gatherInFog(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const {
-  if (between_.kind() != MediaBetween::Kind::fog || !isGrey(between_.fog()) || maps_.empty()) return false;
-  virga::gatherInFog(lights_[i].kernel, lights_[i].kind, to, kind, between_.fog().r, mapOf(i), near);
+bool FrameLights::gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const {
+  if (!between_.grey() || maps_.empty()) return false;
+  const Light& light = lights_[i];
+  const bool looksUp = between_.kind() == MediaBetween::Kind::tables;
+  const DepthTable table = looksUp ? between_.table(i, 0) : DepthTable{};
+  gatherThrough(light.kernel, light.kind, to, kind, looksUp ? &table : nullptr, between_.fog().r, mapOf(i), near);
   return true;
 }
 

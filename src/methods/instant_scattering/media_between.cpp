@@ -135,10 +135,7 @@ void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) con
       lookThroughFog({p.x, p.y, p.z}, to, fog_[c], seen[c]);
     else
       std::fill_n(seen[c], to.count, 1.f);
-    const size_t table = i * static_cast<size_t>(channels_) + static_cast<size_t>(c);
-    if (kind_ == Kind::tables)
-      lookThroughTable({p.x, p.y, p.z}, to, {&depth_[table * sizeOfTable()], options_.side, options_.radii, views_[i]},
-                       seen[c]);
+    if (kind_ == Kind::tables) lookThroughTable({p.x, p.y, p.z}, to, table(i, c), seen[c]);
   }
 }
 

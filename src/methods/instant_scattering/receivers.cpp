@@ -66,7 +66,7 @@ void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const 
       for (Group& group : groups_) {
         if (group.px.empty()) continue;
         if (from.plain && group.plain && options.visibility == Visibility::maps &&
-            lights.gatherInFog(i, group.view(), group.kind, options.near))
+            lights.gatherAtOnce(i, group.view(), group.kind, options.near))
           continue;
         float* seen[3] = {group.seen[0].data(), group.seen[1].data(), group.seen[2].data()};
         look(scene, lights, i, group, options, seen);
