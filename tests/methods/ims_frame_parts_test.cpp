@@ -94,7 +94,7 @@ TEST(EyePacket, MarchesAsEachRayByItself) {
     const CameraRay camera{{{i == 7 ? 3 : 0.3f * u - 0.6f, 0.4f * v - 0.7f, 5}, normalize(Vec3(0.05f, 0.02f, -1))}, 9};
     MarchedEye beside;
     walkEye(view, rays, camera, rays.nearest(camera.ray, camera.tMax), beside,
-            [&](float t0, float t1) { return packet.add(view, i, beside, t0, t1, 100, kShift); });
+            [&](float t0, float t1) { return packet.add(view, i, camera.ray, beside.at.media, t0, t1, 100, kShift); });
     marchEye(view, rays, camera, kShift, eyes[i], 100);
     EXPECT_EQ(packet.has(i), i != 7);
   }

@@ -145,6 +145,22 @@ VIRGA_HD static inline void pointsAt(const KernelEyes& e, const KernelDepths& d,
   }
 }
 
+/// Optical depths of the densest channel along ray number `lane`, at `count` places. Its steps were not shifted.
+VIRGA_HD static inline void depthsAlong(const KernelEyes& e, const KernelDepths& d, int lane, const float* places,
+                                        int count, float* __restrict out) {
+  const float* __restrict before = d.before[0] + lane;
+  const float begin = e.begin[lane], inverse = 1 / e.step[lane];
+  const auto from = static_cast<float>(e.from), to = static_cast<float>(e.to);
+#pragma omp simd
+  for (int m = 0; m < count; ++m) {
+    const float step = (places[m] - begin) * inverse, in = step < from ? from : (step < to ? step : to);
+    const int n = static_cast<int>(in);
+    const float share = clamped(step - static_cast<float>(n), 1);
+    const float a = before[n * KernelEyes::kSize], b = before[(n + 1) * KernelEyes::kSize];
+    out[m] = a + (b - a) * share;
+  }
+}
+
 /// What media scatter of a lamp's light toward the eyes at a point of each: Henyey and Greenstein's phase function of
 /// `anisotropy` over distance squared [1/(sr unit^2)].
 VIRGA_HD static inline void lampAtPoints(const LampPoint& lamp, const KernelEyes& e, const KernelPlaces& at,
@@ -168,6 +184,9 @@ VIRGA_HD static inline void lampAtPoints(const LampPoint& lamp, const KernelEyes
 void marchEyes(const KernelGrid& grid, KernelEyes& eyes, KernelDepths& depths);
 /// kernels::pointsAt.
 void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place, EyePoints& at);
+/// kernels::depthsAlong.
+void lookUpDepths(const KernelEyes& eyes, const KernelDepths& depths, int lane, const float* places, int count,
+                  float* out);
 /// kernels::lampAtPoints where `at` weighs anything, and the rays.
 void lightEyes(const LampPoint& lamp, const KernelEyes& eyes, const EyePoints& at, float anisotropy, float scale,
                float* value, RayPacket& rays);

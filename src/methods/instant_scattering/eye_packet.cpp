@@ -22,15 +22,14 @@ void EyePacket::clear() {
   taken_ = 0;
 }
 
-bool EyePacket::add(const SceneView& scene, size_t lane, const MarchedEye& eye, float t0, float t1, int steps,
-                    float shift) {
-  if (eye.at.media.count() != 1) return false;
-  const MediumView& medium = scene.media[eye.at.media.medium(0)];
+bool EyePacket::add(const SceneView& scene, size_t lane, const Ray& ray, const MediaState& media, float t0, float t1,
+                    int steps, float shift) {
+  if (media.count() != 1 || steps >= KernelDepths::kMostSteps) return false;
+  const MediumView& medium = scene.media[media.medium(0)];
   if (medium_ ? medium_ != &medium : !isPlainSmoke(medium)) return false;
   medium_ = &medium;
   taken_ |= 1u << lane;
   eyes_.shift = shift;
-  const Ray& ray = eye.at.ray;
   const GridRay inGrid(medium, ray);
   const GridView& grid = medium.density;
   const ClippedRange in = clipToBox(inGrid.o, inGrid.d, grid.supportLo, grid.supportHi, t0, t1);
@@ -55,6 +54,13 @@ bool EyePacket::add(const SceneView& scene, size_t lane, const MarchedEye& eye, 
 void EyePacket::remove(size_t lane) {
   taken_ &= ~(1u << lane);
   eyes_.last[lane] = -1;
+}
+
+void EyePacket::depthsAt(size_t lane, std::span<const float> distances, float* out) const {
+  if (eyes_.first[lane] > eyes_.last[lane])
+    std::fill(out, out + distances.size(), 0.f);
+  else
+    lookUpDepths(eyes_, depths_, static_cast<int>(lane), distances.data(), static_cast<int>(distances.size()), out);
 }
 
 void EyePacket::march() {

@@ -114,6 +114,11 @@ void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place
   kernels::pointsAt(eyes, depths, place, at);
 }
 
+void lookUpDepths(const KernelEyes& eyes, const KernelDepths& depths, int lane, const float* places, int count,
+                  float* out) {
+  kernels::depthsAlong(eyes, depths, lane, places, count, out);
+}
+
 void lightEyes(const LampPoint& lamp, const KernelEyes& eyes, const EyePoints& at, float anisotropy, float scale,
                float* value, RayPacket& rays) {
   kernels::lampAtPoints(lamp, eyes, at, anisotropy, value);

@@ -36,7 +36,7 @@ void FramePixels::meet(Block& block, size_t i, const CameraRay& camera, const Ra
     more = block.smoke.has(i);
     if (more) return false;
     if (eye.steps == 0 && packets_.lightSmoke() &&
-        block.smoke.add(scene_.view, i, eye, t0, t1, options_.eyeSteps, numbers_.shift())) {
+        block.smoke.add(scene_.view, i, eye.at.ray, eye.at.media, t0, t1, options_.eyeSteps, numbers_.shift())) {
       return true;
     }
     return marchStretch(scene_.view, eye, t0, t1, numbers_.shift(), options_.eyeSteps);

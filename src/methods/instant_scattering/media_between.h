@@ -7,6 +7,7 @@
 
 #include "methods/instant_scattering/frame_kernels.h"
 #include "scene/scene.h"
+#include "transport/media_walk.h"
 
 namespace virga {
 
@@ -44,7 +45,10 @@ class MediaBetween {
     return static_cast<size_t>(options_.side) * static_cast<size_t>(options_.side) *
            static_cast<size_t>(options_.radii);
   }
-  void fillRow(const Scene& scene, size_t i, int row);
+  /// Some nodes' directions from point number i, which lies in these media.
+  void fill(const Scene& scene, size_t i, const MediaState& media, size_t first);
+  /// One of them by itself.
+  void fillNode(const Scene& scene, MediaRay r, const std::vector<float>& distances, float* out) const;
 
   Options options_;
   Kind kind_ = Kind::nothing;
