@@ -9,7 +9,7 @@ namespace virga {
 namespace {
 
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
-constexpr int kGroup = 32;
+constexpr int kGroup = 64;
 
 /// Radius of a light that is spread, in spacings of the lights.
 constexpr float kRadiusSpacings = 2;
@@ -71,7 +71,7 @@ class FramePass {
         features[numberOf(x, y)] = block.features[i];
         if (!block.eyes[i].plain || !marches)
           block.radiance[i] = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
-        block.radiance[i] += paths_.sampleGlow(x, y, idOf(x, y));
+        if (scene_.view.emissive) block.radiance[i] += paths_.sampleGlow(x, y, idOf(x, y));
         frame.set(x, y, block.radiance[i]);
       }
     });

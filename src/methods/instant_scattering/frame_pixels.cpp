@@ -4,8 +4,7 @@
 namespace virga {
 
 CameraRay FramePixels::cameraRay(int x, int y) const {
-  const Vec2 offset = scene_.filter.sample(numbers_.place());
-  return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+  return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset_.x, static_cast<float>(y) + 0.5f + offset_.y);
 }
 
 void FramePixels::direct(Block& block) const {

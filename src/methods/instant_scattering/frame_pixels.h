@@ -22,6 +22,7 @@ class FramePixels {
         lights_(lights),
         options_(options),
         numbers_{pass},
+        offset_(scene.filter.sample(numbers_.place())),
         packets_(scene_, rays_, lamps, numbers_) {}
   FramePixels(const FramePixels&) = delete;
   FramePixels& operator=(const FramePixels&) = delete;
@@ -63,6 +64,7 @@ class FramePixels {
   const FrameLights& lights_;
   const ImsOptions& options_;
   FixedNumbers numbers_;
+  Vec2 offset_;          ///< of all camera rays from the middle of their pixel [pixels]
   LampPackets packets_;  ///< refers to the members above
 };
 
