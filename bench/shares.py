@@ -14,6 +14,8 @@ import sys
 TASKS = [
     ("logarithms", r"exponential|logf"),
     ("random numbers", r"Pcg32|core/(random|sampler)\.h"),
+    ("lamp tables", r"LampTable|lamp_tables\.h"),
+    ("checks of tables", r"optical_depth\.h"),
     ("grid lookups", r"BoxView|lookupInside|SparseGridView"),
     ("majorant cells", r"CellAxis|walkMajorants|forEachMajorant|CoarseGridView|clipToBox"),
     ("tentative collisions", r"transport/tracking\.h"),

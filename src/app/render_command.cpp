@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
@@ -190,9 +191,14 @@ class RenderJob {
     const SceneDescription description =
         timed(report_.timings.load, [&] { return loadScene(options, report_.warnings); });
     requireInputsSafe(filesOf(description));
-    SceneSnapshot scene = timed(report_.timings.build, [&] {
-      return buildScene(description, {.filmSize = options_.size, .lenient = options_.scene.lenient}, scene_);
-    });
+    SceneSnapshot scene;
+    // To read large files takes a thread: another one hashes them meanwhile.
+    tbb::parallel_invoke(
+        [&] {
+          const BuildOptions build{.filmSize = options_.size, .lenient = options_.scene.lenient};
+          scene = timed(report_.timings.build, [&] { return buildScene(description, build, scene_); });
+        },
+        [&] { report_.sceneHash = contentHash(description); });
     report_.warnings.insert(report_.warnings.end(), scene->warnings.begin(), scene->warnings.end());
     for (const std::string& warning : report_.warnings)
       if (warned_.insert(warning).second) say("{}\n", warning);

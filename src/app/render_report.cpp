@@ -24,7 +24,7 @@ Metadata metadata(const RenderSession& session, const RenderReport& report) {
   m["virga.version"] = VIRGA_VERSION;
   m["virga.scene"] = report.sceneFile;
   if (report.frame) m["virga.frame"] = int64_t{*report.frame};
-  m["virga.scene_hash"] = hashText(contentHash(session.scene().description));
+  m["virga.scene_hash"] = hashText(report.sceneHash);
   m["virga.method"] = std::string(session.info().name);
   for (const auto& [name, value] : session.method().settingsInForce())
     m[fmt::format("virga.{}.{}", session.info().name, name)] = value;
@@ -56,9 +56,9 @@ Json timingsJson(const Timings& t) {
           {"total", t.total}};
 }
 
-Json sceneJson(const RenderSession& session, const std::string& file) {
-  return {{"file", file},
-          {"hash", hashText(contentHash(session.scene().description))},
+Json sceneJson(const RenderSession& session, const RenderReport& report) {
+  return {{"file", report.sceneFile},
+          {"hash", hashText(report.sceneHash)},
           {"width", session.film().width()},
           {"height", session.film().height()}};
 }
@@ -90,7 +90,7 @@ LayeredImage developed(const RenderSession& session, const RenderReport& report,
 std::string statsJson(const RenderSession& session, const RenderReport& report) {
   const auto error = session.film().estimatedRelMse();
   const Json json = {{"version", VIRGA_VERSION},
-                     {"scene", sceneJson(session, report.sceneFile)},
+                     {"scene", sceneJson(session, report)},
                      {"frame", report.frame ? Json(*report.frame) : Json(nullptr)},
                      {"method", methodJson(session, report.outcome)},
                      {"threads", report.threads},

@@ -25,6 +25,7 @@ struct Timings {
 /// Everything that `--stats` tells besides what is in the session.
 struct RenderReport {
   std::string sceneFile;
+  uint64_t sceneHash = 0;    ///< contentHash() of its description
   std::optional<int> frame;  ///< of a sequence
   std::vector<std::string> outputs;
   std::string stats, dots;  ///< files; empty: none

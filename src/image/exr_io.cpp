@@ -12,11 +12,14 @@
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
 #include <ImfStringAttribute.h>
+#include <ImfThreading.h>
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <climits>
 #include <cstring>
+#include <mutex>
 #include <set>
 
 #include "core/error.h"
@@ -293,6 +296,16 @@ void addImage(Imf::Header& header, Imf::FrameBuffer& frame, const std::string& p
   }
 }
 
+/// Threads of the library that may help the caller: as many as the caller's arena has, or none if it has but one.
+int helpers() {
+  static std::mutex mutex;
+  const int threads = tbb::this_task_arena::max_concurrency();
+  if (threads < 2) return 0;
+  const std::lock_guard lock(mutex);
+  if (Imf::globalThreadCount() < threads) Imf::setGlobalThreadCount(threads);
+  return threads;
+}
+
 }  // namespace
 
 bool isExr(std::string_view bytes) { return bytes.starts_with(std::string_view(kMagic, sizeof kMagic)); }
@@ -338,7 +351,7 @@ std::string encodeExr(const LayeredImage& image) {
 
   MemoryOutput stream;
   {
-    Imf::OutputFile file(stream, header, 0);  // its end writes the table of chunks
+    Imf::OutputFile file(stream, header, helpers());  // its end writes the table of chunks
     file.setFrameBuffer(frame);
     file.writePixels(height);
   }

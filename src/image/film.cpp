@@ -78,6 +78,13 @@ void PassFrame::set(int x, int y, const LayerRadiance& radiance) {
     if (layers_.has(static_cast<Layer>(i))) planes_[plane++].at(x, y) = radiance.value[i];
 }
 
+void PassFrame::add(int x, int y, Layer layer, Rgb radiance) {
+  if (!planes_[0].pixels.empty()) planes_[0].at(x, y) += radiance;
+  if (!layers_.has(layer)) return;
+  const uint32_t before = layers_.bits & ((1u << static_cast<int>(layer)) - 1);
+  planes_[1 + static_cast<size_t>(std::popcount(before))].at(x, y) += radiance;
+}
+
 // ---- Film: the passes -----------------------------------------------------------------------------------------------
 
 Film::Film(int width, int height, LayerMask layers) : frame_(width, height, layers) {}

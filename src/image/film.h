@@ -22,6 +22,8 @@ class PassFrame {
   LayerMask layers() const { return layers_; }
   /// Sets the pixel's value of this pass (a mean over the pass's samples in that pixel), in every plane.
   void set(int x, int y, const LayerRadiance& radiance);
+  /// Adds to a pixel that this pass has set.
+  void add(int x, int y, Layer layer, Rgb radiance);
 
  private:
   friend class Film;

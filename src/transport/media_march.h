@@ -83,8 +83,11 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   return true;
 }
 
-/// Of an optical depth. Mostly it is grey, and one exponential does.
-VIRGA_HD inline Rgb transmittanceOf(Rgb depth) { return isGrey(depth) ? Rgb(std::exp(-depth.r)) : exp(depth * -1); }
+/// Of an optical depth. Mostly it is grey, and one exponential does, or there is nothing.
+VIRGA_HD inline Rgb transmittanceOf(Rgb depth) {
+  if (isBlack(depth)) return Rgb(1.f);
+  return isGrey(depth) ? Rgb(std::exp(-depth.r)) : exp(depth * -1);
+}
 
 /// Transmittance along a ray by marching; null boundaries are passed, surfaces are not looked at.
 template <class Rays>

@@ -97,15 +97,17 @@ std::vector<PixelFeatures> twoFloors(int width, int height) {
   return features;
 }
 
-/// The light of all pixels, row by row.
-std::vector<Upsampling::Light> spread(const Upsampling& upsampling, const std::vector<Upsampling::Light>& computed,
-                                      int width, int height) {
-  std::vector<Upsampling::Light> all(static_cast<size_t>(width * height));
+/// The light of all pixels, row by row. lightOf(pixel): of those that are computed.
+template <class LightOf>
+std::vector<Upsampling::Light> spread(const Upsampling& upsampling, const LightOf& lightOf, int width, int height) {
+  std::vector<Upsampling::Light> all(static_cast<size_t>(width * height)), coarse;
   std::vector<int> visits(all.size());
-  upsampling.spread(computed, {}, [&](int x, int y, const Upsampling::Light& light) {
+  const auto show = [&](int x, int y, const Upsampling::Light& light) {
     all[static_cast<size_t>(y * width + x)] = light;
     ++visits[static_cast<size_t>(y * width + x)];
-  });
+  };
+  for (const auto& p : upsampling.coarse()) coarse.push_back(lightOf(p));
+  for (const auto& p : upsampling.spread(coarse, {}, show)) show(p.x, p.y, lightOf(p));
   EXPECT_EQ(std::count(visits.begin(), visits.end(), 1), width * height) << "each pixel once";
   return all;
 }
@@ -115,13 +117,12 @@ void expectEvenLightStaysSo(int spacing) {
   const auto features = twoFloors(width, height);
   const Upsampling upsampling(features, width, height, spacing);
   const auto at = [&](int x, int y) -> const PixelFeatures& { return features[static_cast<size_t>(y * width + x)]; };
-  std::vector<Upsampling::Light> light;
-  for (const auto& p : upsampling.computed()) {
+  const auto lightOf = [&](const Upsampling::Pixel& p) -> Upsampling::Light {
     const PixelFeatures& f = at(p.x, p.y);
     const float side = p.x < width / 2 ? 1.f : 5.f;
-    light.push_back({{f.surface * side, f.surface * (2 * side)}, {f.opacity * 3, f.opacity * 4}});
-  }
-  const auto all = spread(upsampling, light, width, height);
+    return {{f.surface * side, f.surface * (2 * side)}, {f.opacity * 3, f.opacity * 4}};
+  };
+  const auto all = spread(upsampling, lightOf, width, height);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const float side = x < width / 2 ? 1.f : 5.f;
@@ -142,25 +143,31 @@ TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
 TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
   const int width = 40, height = 24;
   auto features = twoFloors(width, height);
-  const size_t coarse = Upsampling(features, width, height, 8).computed().size();
-  EXPECT_EQ(coarse, 5u * 3u);
   features[static_cast<size_t>(9 * width + 11)].p.z = -5;  // something thin before the floor...
   features[static_cast<size_t>(9 * width + 11)].depth = 5;
-  features[static_cast<size_t>(20 * width + 30)].regular = false;  // ...and a mirror
+  features[static_cast<size_t>(20 * width + 30)].regular = false;  // ...a mirror...
+  features[static_cast<size_t>(4 * width + 4)].regular = false;    // ...and one at a coarse pixel
   const Upsampling upsampling(features, width, height, 8);
-  ASSERT_EQ(upsampling.computed().size(), coarse + 2);
-  EXPECT_EQ(upsampling.computed()[coarse].x, 11);
-  EXPECT_EQ(upsampling.computed()[coarse + 1].x, 30);
-  std::vector<Upsampling::Light> light(coarse + 2);
-  light[coarse + 1].media[0] = Rgb(7.f);
-  EXPECT_EQ(spread(upsampling, light, width, height)[20 * width + 30].media[0].r, 7.f);
+  ASSERT_EQ(upsampling.coarse().size(), 5u * 3u);
+  std::vector<int> computed;
+  const auto lightOf = [&](const Upsampling::Pixel& p) -> Upsampling::Light {
+    computed.push_back(p.y * width + p.x);
+    return {{}, {Rgb(p.x == 30 || p.x == 4 ? 7.f : 0.f), {}}};
+  };
+  const auto all = spread(upsampling, lightOf, width, height);
+  EXPECT_EQ(std::vector<int>(computed.begin() + 15, computed.end()), (std::vector{9 * width + 11, 20 * width + 30}));
+  EXPECT_EQ(all[20 * width + 30].media[0].r, 7.f);
+  EXPECT_EQ(all[4 * width + 4].media[0].r, 7.f);
 }
 
 TEST(Upsampling, OnePixelIsAPicture) {
-  const Upsampling upsampling(twoFloors(1, 1), 1, 1, 8);
-  ASSERT_EQ(upsampling.computed().size(), 1u);
-  const std::vector<Upsampling::Light> light{{{Rgb(1.f), Rgb(2.f)}, {Rgb(3.f), Rgb(4.f)}}};
-  EXPECT_NEAR(spread(upsampling, light, 1, 1)[0].media[1].g, 4, 1e-5f);
+  const auto features = twoFloors(1, 1);
+  const Upsampling upsampling(features, 1, 1, 8);
+  ASSERT_EQ(upsampling.coarse().size(), 1u);
+  const auto lightOf = [](const Upsampling::Pixel&) -> Upsampling::Light {
+    return {{Rgb(1.f), Rgb(2.f)}, {Rgb(3.f), Rgb(4.f)}};
+  };
+  EXPECT_NEAR(spread(upsampling, lightOf, 1, 1)[0].media[1].g, 4, 1e-5f);
 }
 
 TEST(PixelFeatures, OfFogBeforeAWall) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Frames of instant multiple scattering: coherence over time, accuracy, and the kernels that they are made of.
+// Frames of instant multiple scattering: coherence over time, and accuracy.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -7,12 +7,7 @@
 #include <regex>
 
 #include "methods/ims_scenes.h"
-#include "methods/instant_scattering/frame_lights.h"
-#include "methods/instant_scattering/lamp_packets.h"
 #include "methods/rendering.h"
-#include "volume/grid.h"
-#include "volume/lookup_along.h"
-#include "volume/procedural.h"
 
 namespace virga {
 namespace {
@@ -245,90 +240,6 @@ TEST(ImsFrame, AStopLeavesNothing) {
   EXPECT_FALSE(session.step({}, stop.get_token()).completed);
   EXPECT_TRUE(session.step().completed);
   EXPECT_TRUE(session.step().biased);
-}
-
-// --- kernels ---
-
-TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
-  const float bound = 4, radius = 0.5f;  // 1 / sqrt(bound)
-  double spread = 0;
-  const int n = 100000;
-  for (int i = 0; i < n; ++i) {
-    const float d = radius * (static_cast<float>(i) + 0.5f) / n;
-    spread += static_cast<double>(kernels::spreadFalloff(d * d, bound) * d * d) * static_cast<double>(radius) / n;
-  }
-  EXPECT_NEAR(spread, static_cast<double>(radius), 1e-4);  // as does 1 / d^2
-  EXPECT_NEAR(kernels::spreadFalloff(0.2499f, bound), kernels::spreadFalloff(0.2501f, bound), 0.01f);
-}
-
-TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
-  LampPoint lamp;
-  lamp.known = true, lamp.px = 0.3f, lamp.py = 0.5f, lamp.pz = -2;
-  lamp.all = 1;
-  FogRays fog{};  // the others are not there
-  fog.dz[3] = -1, fog.t0[3] = 0.5f, fog.t1[3] = 4;
-  fog.sigmaT[0][3] = 0.4f, fog.sigmaT[1][3] = 0.8f, fog.anisotropy[3] = 0.3f;
-  double truth = 0;
-  const int n = 200000;
-  for (int i = 0; i < n; ++i) {
-    const double t = 0.5 + 3.5 * (i + 0.5) / n, z = -2 + t, d2 = 0.34 + z * z, c = (t - 2) / std::sqrt(d2);
-    const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
-    truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
-  }
-  KernelPlaces at;
-  RayPacket rays;
-  float value[3][RayPacket::kSize];
-  constexpr int kShifts = 64;
-  double sum = 0;
-  for (int shift = 0; shift < kShifts; ++shift) {
-    lightFog(lamp, fog, (static_cast<float>(shift) + 0.5f) / kShifts, 5, at, value, rays);
-    sum += static_cast<double>(value[0][3]) / kShifts;
-    EXPECT_EQ(value[2][3], 0);
-    EXPECT_EQ(value[0][0], 0);
-    EXPECT_GT(rays.tMax[3], 0);
-    EXPECT_EQ(rays.tMax[0], 0);
-  }
-  EXPECT_NEAR(sum, truth, 2e-3 * truth);
-}
-
-TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
-  DenseVolume volume = makeProcedural(ProceduralKind::smoke, {.resolution = 32});
-  const auto grid = Grid::dense(volume.nx, volume.ny, volume.nz, std::move(volume.values), {});
-  const GridView view = grid->view();
-  const Vec3 o(3, 28, 1), d(0.31f, -0.4f, 0.47f);
-  float out[60];
-  lookupAlong(view, o, d, 60, out);
-  for (int n = 0; n < 60; ++n) EXPECT_NEAR(out[n], view.lookup(o + d * static_cast<float>(n)), 1e-4f) << n;
-}
-
-// Tables of optical depths are near those that marching finds, from lights in the plume and on the floor.
-TEST(FrameLights, TablesKnowTheMedia) {
-  const SceneSnapshot scene = sceneOf(plume(8));
-  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}),
-                           {.most = 200, .shadows = FrameLights::ShadowMapping::none}, {});
-  ASSERT_GT(lights.lights().size(), 100u);
-  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
-  std::vector<float> x, y, z, none(64, 0.f), seen(64);
-  for (int i = 0; i < 64; ++i)
-    x.push_back(-0.9f + 0.6f * static_cast<float>(i % 4)), y.push_back(-0.9f + 0.6f * static_cast<float>(i / 4 % 4)),
-        z.push_back(-0.8f + 0.6f * static_cast<float>(i / 16));
-  const KernelReceivers to{64,          x.data(),    y.data(),    z.data(),    none.data(), none.data(),
-                           none.data(), none.data(), none.data(), none.data(), none.data()};
-  double error = 0, sum = 0;
-  for (size_t l = 0; l < lights.lights().size(); ++l) {
-    float* out[3] = {seen.data(), seen.data(), seen.data()};
-    lights.lookFrom(l, to, EndKind::isotropic, out);
-    const Vec3 from = lights.lights()[l].vertex->p + lights.lights()[l].vertex->normal * 1e-3f;
-    const MediaState media = mediaAt(*scene, from);
-    for (size_t i = 0; i < 64; ++i) {
-      const Vec3 way = Vec3(x[i], y[i], z[i]) - from;
-      const float d = length(way);
-      const float truth = marchedTransmittance(scene->view, rays, {{from, way / d}, media, 0}, d, 128, 0).g;
-      error += static_cast<double>(std::fabs(seen[i] - truth));
-      sum += static_cast<double>(truth);
-    }
-  }
-  EXPECT_LT(error, 0.06 * sum);
 }
 
 }  // namespace

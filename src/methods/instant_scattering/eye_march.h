@@ -33,8 +33,10 @@ struct MarchedEye {
 
   bool plain = true;  ///< no mirror, glass or narrow bsdf is met, and no more stretches than can be kept
 
-  /// Nothing behind it counts: less than 1e-7 of it is seen.
-  VIRGA_HD bool opaque() const { return minComponent(depth) > 16; }
+  /// Nothing behind such an optical depth counts: about 1e-7 of it is seen.
+  static constexpr float kOpaque = 16;
+
+  VIRGA_HD bool opaque() const { return minComponent(depth) > kOpaque; }
   VIRGA_HD float opacity() const { return 1 - std::exp(-mean(depth)); }
 
   /// Points in equal parts of what is seen of the media, each of them at `shift` in [0, 1) of its part:
@@ -58,10 +60,11 @@ struct MarchedEye {
   }
 };
 
-/// Fills `eye`, steps shifted by `shift`; at most MarchedEye::kSteps of them. `hit`: what the ray meets.
-template <class Rays>
-VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, const RayHit& hit,
-                       float shift, MarchedEye& eye, int steps = MarchedEye::kSteps) {
+/// What an eye ray meets, and all that it passes: stretch(t0, t1) of the media that `eye.at` holds then, until it
+/// returns false. `hit`: what the ray meets.
+template <class Rays, class Stretch>
+VIRGA_HD void walkEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, const RayHit& hit,
+                      MarchedEye& eye, Stretch&& stretch) {
   eye.at = leaveCamera(scene, camera.ray);
   eye.hit = hit;
   eye.depth = Rgb();
@@ -72,21 +75,32 @@ VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay
     eye.side = sideOf(scene, eye.point, eye.hit, -eye.at.ray.d, eye.textured);
     eye.plain = eye.side.bsdf->broad();
   }
-  walkMedia(scene, rays, eye.at, eye.hit.found() ? eye.hit.t : camera.tMax, [&](float t0, float t1) {
-    if (eye.at.media.vacuum()) return true;
-    const bool kept = eye.stretches < MarchedEye::kMostStretches;
-    eye.plain &= kept;
-    if (kept) eye.media[eye.stretches] = eye.at.media;
-    marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, steps, shift, [&](float a, float b, Rgb here) {
-      if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))
-        eye.step[eye.steps++] = {
-            a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
-      eye.depth += here;
-      return !eye.opaque();
-    });
-    eye.stretches += kept ? 1 : 0;
+  walkMedia(scene, rays, eye.at, eye.hit.found() ? eye.hit.t : camera.tMax,
+            [&](float t0, float t1) { return eye.at.media.vacuum() || stretch(t0, t1); });
+}
+
+/// Marches an eye ray through its next stretch, the media of which it holds; steps are shifted by `shift`. Returns
+/// whether what lies behind it counts.
+VIRGA_HD inline bool marchStretch(const SceneView& scene, MarchedEye& eye, float t0, float t1, float shift, int steps) {
+  const bool kept = eye.stretches < MarchedEye::kMostStretches;
+  eye.plain &= kept;
+  if (kept) eye.media[eye.stretches] = eye.at.media;
+  marchMedia(scene, eye.at.media, eye.at.ray, t0, t1, steps, shift, [&](float a, float b, Rgb here) {
+    if (kept && eye.steps < MarchedEye::kMostSteps && !isBlack(here))
+      eye.step[eye.steps++] = {a, b, {eye.depth.r, eye.depth.g, eye.depth.b}, {here.r, here.g, here.b}, eye.stretches};
+    eye.depth += here;
     return !eye.opaque();
   });
+  eye.stretches += kept ? 1 : 0;
+  return !eye.opaque();
+}
+
+/// Fills `eye`, steps shifted by `shift`; at most MarchedEye::kSteps of them. `hit`: what the ray meets.
+template <class Rays>
+VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, const RayHit& hit,
+                       float shift, MarchedEye& eye, int steps = MarchedEye::kSteps) {
+  walkEye(scene, rays, camera, hit, eye,
+          [&](float t0, float t1) { return marchStretch(scene, eye, t0, t1, shift, steps); });
 }
 template <class Rays>
 VIRGA_HD void marchEye(const SceneView& scene, const Rays& rays, const CameraRay& camera, float shift, MarchedEye& eye,

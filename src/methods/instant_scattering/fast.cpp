@@ -6,57 +6,50 @@
 namespace virga {
 namespace {
 
-/// Light of the layers that are not upsampled: those before the others.
-using DirectLight = std::array<Rgb, static_cast<size_t>(Layer::surfaceToSurface)>;
-
 /// One pass.
 class FastPass {
  public:
   FastPass(const Scene& scene, const ImsPixels& pixels, const ImsOptions& options, const SampleId& id,
            const std::stop_token& stop, PassFrame& frame)
-      : scene_(scene),
-        pixels_(pixels),
-        samples_(options.samples),
-        id_(id),
-        stop_(stop),
-        frame_(frame),
-        features_(numberOf(0, frame.height())) {}
+      : scene_(scene), pixels_(pixels), samples_(options.samples), id_(id), stop_(stop), frame_(frame) {}
 
   /// What the pixels show.
-  std::vector<PixelFeatures> look() {
-    forEachPixel(frame_, stop_, [&](int x, int y) { features_[numberOf(x, y)] = pixels_.features(x, y); });
-    return std::move(features_);
+  void look(std::span<PixelFeatures> features) {
+    forEachPixel(frame_, stop_, [&](int x, int y) { features[numberOf(x, y)] = pixels_.features(x, y); });
   }
-  /// Likewise; their light is kept for fill().
-  std::vector<PixelFeatures> lookAndLight() {
-    direct_.resize(features_.size());
+  /// Likewise; their own light goes into the frame, and fill() adds to it.
+  void lookAndLight(std::span<PixelFeatures> features) {
+    isLit_ = true;
     forEachPixel(frame_, stop_, [&](int x, int y) {
-      const LayerRadiance radiance = pixels_.sampleMiddle(x, y, of(x, y), features_[numberOf(x, y)]);
-      std::copy_n(radiance.value, direct_[numberOf(x, y)].size(), direct_[numberOf(x, y)].begin());
-    });
-    return std::move(features_);
-  }
-
-  void fill(const Upsampling& upsampling) {
-    const std::vector<Upsampling::Pixel>& computed = upsampling.computed();
-    std::vector<Upsampling::Light> light(computed.size());
-    parallelFor(static_cast<int64_t>(computed.size()), 4, [&](int64_t i) {
-      if (stop_.stop_requested()) return;
-      light[static_cast<size_t>(i)] = indirectLight(computed[static_cast<size_t>(i)]);
-    });
-    upsampling.spread(light, stop_, [&](int x, int y, const Upsampling::Light& indirect) {
-      LayerRadiance radiance;
-      if (direct_.empty())
-        radiance = pixels_.sample(x, y, of(x, y), ImsPixels::Part::direct);
-      else
-        std::copy_n(direct_[numberOf(x, y)].begin(), direct_[numberOf(x, y)].size(), radiance.value);
-      indirect.addTo(radiance);
+      LayerRadiance radiance = pixels_.sampleMiddle(x, y, of(x, y), features[numberOf(x, y)]);
       radiance += pixels_.sampleGlow(x, y, of(x, y));
       frame_.set(x, y, radiance);
     });
   }
 
+  void fill(const Upsampling& upsampling) {
+    const auto body = [&](int x, int y, const Upsampling::Light& indirect) { show(x, y, indirect); };
+    const std::vector<Upsampling::Pixel> others = upsampling.spread(indirectLight(upsampling.coarse()), stop_, body);
+    const std::vector<Upsampling::Light> light = indirectLight(others);
+    if (stop_.stop_requested()) return;
+    for (size_t i = 0; i < others.size(); ++i) show(others[i].x, others[i].y, light[i]);
+  }
+
  private:
+  std::vector<Upsampling::Light> indirectLight(std::span<const Upsampling::Pixel> pixels) const {
+    std::vector<Upsampling::Light> light(pixels.size());
+    parallelFor(static_cast<int64_t>(pixels.size()), 4, [&](int64_t i) {
+      if (!stop_.stop_requested()) light[static_cast<size_t>(i)] = indirectLight(pixels[static_cast<size_t>(i)]);
+    });
+    return light;
+  }
+  void show(int x, int y, const Upsampling::Light& indirect) const {
+    if (isLit_) return indirect.visit([&](Layer layer, Rgb radiance) { frame_.add(x, y, layer, radiance); });
+    LayerRadiance radiance = pixels_.sample(x, y, of(x, y), ImsPixels::Part::direct);
+    indirect.visit([&](Layer layer, Rgb more) { radiance.add(layer, more); });
+    radiance += pixels_.sampleGlow(x, y, of(x, y));
+    frame_.set(x, y, radiance);
+  }
   Upsampling::Light indirectLight(Upsampling::Pixel p) const {
     Upsampling::Light light;
     const float share = 1 / static_cast<float>(samples_);
@@ -82,8 +75,7 @@ class FastPass {
   SampleId id_;
   const std::stop_token& stop_;
   PassFrame& frame_;
-  std::vector<PixelFeatures> features_;
-  std::vector<DirectLight> direct_;  ///< of all pixels, where they have been lit already
+  bool isLit_ = false;
 };
 
 }  // namespace
@@ -108,9 +100,16 @@ void FastRenderer::pass(const Scene& scene, const ImsPixels& pixels, const ImsOp
   FastPass own(scene, pixels, options, id, stop, frame);
   const bool lights = id.replicate == 0 && id.index == 0 && pixels.marches();
   if (lights || !upsampling_) {
-    std::vector<PixelFeatures> features = lights ? own.lookAndLight() : own.look();
+    const size_t all = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
+    if (features_.size() != all) features_ = LargeArray<PixelFeatures>(all);
+    const std::span features(features_.data(), all);
+    upsampling_ = nullptr;
+    if (lights)
+      own.lookAndLight(features);
+    else
+      own.look(features);
     if (stop.stop_requested()) return;
-    upsampling_ = std::make_unique<Upsampling>(std::move(features), frame.width(), frame.height(), options.spacing);
+    upsampling_ = std::make_unique<Upsampling>(features, frame.width(), frame.height(), options.spacing);
   }
   own.fill(*upsampling_);
 }

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "core/large_array.h"
 #include "methods/instant_scattering/ims_pixels.h"
 #include "methods/instant_scattering/upsampling.h"
 
@@ -24,7 +25,8 @@ class FastRenderer {
             const std::stop_token& stop, PassFrame& frame);
 
  private:
-  std::unique_ptr<Upsampling> upsampling_;  ///< of this scene and camera
+  LargeArray<PixelFeatures> features_;      ///< of this scene and camera
+  std::unique_ptr<Upsampling> upsampling_;  ///< likewise
   std::unique_ptr<LampTables> tables_;      ///< of this scene
 };
 

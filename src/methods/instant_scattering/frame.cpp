@@ -9,14 +9,10 @@ namespace virga {
 namespace {
 
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
-constexpr int kGroup = 32;
+constexpr int kGroup = 64;
 
 /// Radius of a light that is spread, in spacings of the lights.
 constexpr float kRadiusSpacings = 2;
-
-/// The layers that are not upsampled: those before the others.
-constexpr int kDirectLayers = static_cast<int>(Layer::surfaceToSurface);
-using DirectLight = std::array<Rgb, kDirectLayers>;
 
 /// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
 template <class Body>
@@ -42,30 +38,27 @@ class FramePass {
         pixels_(scene, lights, lamps, options_, index),
         paths_(scene, lights.virtualLights(), visibilityOfPaths(options), followed(options)) {}
 
-  bool run(const std::stop_token& stop, PassFrame& frame) {
+  /// `features`: room for those of all pixels.
+  bool run(const std::stop_token& stop, std::span<PixelFeatures> features, PassFrame& frame) {
     width_ = frame.width();
-    std::vector<PixelFeatures> features = lightDirectly(frame, stop);
+    lightDirectly(stop, features, frame);
     if (stop.stop_requested()) return false;
-    const Upsampling upsampling(std::move(features), frame.width(), frame.height(), options_.spacing);
-    const std::vector<Upsampling::Light> light = indirectLight(upsampling.computed(), stop);
-    upsampling.spread(light, stop, [&](int x, int y, const Upsampling::Light& indirect) {
-      LayerRadiance radiance;
-      std::copy_n(direct_[numberOf(x, y)].begin(), kDirectLayers, radiance.value);
-      indirect.addTo(radiance);
-      radiance += paths_.sampleGlow(x, y, idOf(x, y));
-      frame.set(x, y, radiance);
-    });
+    const auto show = [&](int x, int y, const Upsampling::Light& indirect) {
+      indirect.visit([&](Layer layer, Rgb radiance) { frame.add(x, y, layer, radiance); });
+    };
+    const Upsampling upsampling(features, frame.width(), frame.height(), options_.spacing);
+    const std::vector<Upsampling::Pixel> others =
+        upsampling.spread(indirectLight(upsampling.coarse(), stop), stop, show);
+    const std::vector<Upsampling::Light> light = indirectLight(others, stop);
+    for (size_t i = 0; i < others.size(); ++i) show(others[i].x, others[i].y, light[i]);
     return !stop.stop_requested();
   }
 
  private:
-  /// Fills direct_; what the pixels show.
-  std::vector<PixelFeatures> lightDirectly(const PassFrame& frame, const std::stop_token& stop) {
+  /// What the pixels show, and their own light.
+  void lightDirectly(const std::stop_token& stop, std::span<PixelFeatures> features, PassFrame& frame) {
     // Panes are looked through by paths alone, and paths of one segment see lamps alone.
     const bool marches = !scene_.view.thinGlass && (options_.path.maxDepth < 0 || options_.path.maxDepth >= 2);
-    const size_t all = numberOf(0, frame.height());
-    std::vector<PixelFeatures> features(all);
-    direct_.resize(all);
     tbb::enumerable_thread_specific<FramePixels::Block> blocks;
     forEachBlock(frame, stop, [&](int x0, int y0, int x1, int y1) {
       FramePixels::Block& block = blocks.local();
@@ -78,10 +71,10 @@ class FramePass {
         features[numberOf(x, y)] = block.features[i];
         if (!block.eyes[i].plain || !marches)
           block.radiance[i] = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
-        std::copy_n(block.radiance[i].value, kDirectLayers, direct_[numberOf(x, y)].begin());
+        if (scene_.view.emissive) block.radiance[i] += paths_.sampleGlow(x, y, idOf(x, y));
+        frame.set(x, y, block.radiance[i]);
       }
     });
-    return features;
   }
 
   std::vector<Upsampling::Light> indirectLight(std::span<const Upsampling::Pixel> computed,
@@ -131,7 +124,6 @@ class FramePass {
   FramePixels pixels_;  ///< refers to the members above
   ImsPixels paths_;     ///< of pixels that are left to paths
   int width_ = 0;
-  std::vector<DirectLight> direct_;
 };
 
 }  // namespace
@@ -169,7 +161,9 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t
   const float spacing = lights_->spacing();  // none, if they all lie in a plane
   if (!(own.frame.near.bound > 0))
     own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
-  return FramePass(scene, *lights_, *lamps_, own, seed, index).run(stop, frame);
+  const size_t pixels = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
+  if (features_.size() != pixels) features_ = LargeArray<PixelFeatures>(pixels);
+  return FramePass(scene, *lights_, *lamps_, own, seed, index).run(stop, {features_.data(), pixels}, frame);
 }
 
 }  // namespace virga

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "core/large_array.h"
 #include "methods/instant_scattering/frame_pixels.h"
 #include "methods/instant_scattering/ims_pixels.h"
 #include "methods/pixels.h"
@@ -29,9 +30,10 @@ class FrameRenderer {
                      const std::stop_token& stop);
 
   std::unique_ptr<FrameLights> lights_;
-  std::unique_ptr<FrameLamps> lamps_;  ///< there where lights_ are
-  uint32_t lightsOf_ = 0;              ///< the pass that they belong to
-  int around_ = 0;                     ///< the medium that had no end when they were made
+  std::unique_ptr<FrameLamps> lamps_;   ///< there where lights_ are
+  LargeArray<PixelFeatures> features_;  ///< room for them
+  uint32_t lightsOf_ = 0;               ///< the pass that they belong to
+  int around_ = 0;                      ///< the medium that had no end when they were made
 };
 
 }  // namespace virga

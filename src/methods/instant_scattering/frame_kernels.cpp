@@ -1,29 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compiled with -ffast-math (CMakeLists.txt): without it no loop with an exponential becomes vector code.
-#include "methods/instant_scattering/lamp_kernels.h"
+#include "methods/instant_scattering/eye_kernels.h"
 #include "scene/shape.h"
 
 namespace virga {
 namespace {
 
-template <EndKind light, EndKind receiver>
-void gatherBy(const KernelLight& l, const KernelReceivers& to, const float* const seen[3], const NearField& near) {
-  if (near.kind == NearField::Kind::clamped)
-    kernels::gather<light, receiver, NearField::Kind::clamped>(l, to, seen[0], seen[1], seen[2], near.bound);
-  else
-    kernels::gather<light, receiver, NearField::Kind::spread>(l, to, seen[0], seen[1], seen[2], near.bound);
-}
+template <EndKind kind>
+struct Kind {
+  static constexpr EndKind value = kind;
+};
 
-template <EndKind light>
-void gatherFrom(const KernelLight& l, const KernelReceivers& to, EndKind kind, const float* const seen[3],
-                const NearField& near) {
+/// body(Kind) for the kind.
+template <class Body>
+void withKind(EndKind kind, const Body& body) {
   switch (kind) {
     case EndKind::lambertian:
-      return gatherBy<light, EndKind::lambertian>(l, to, seen, near);
+      return body(Kind<EndKind::lambertian>());
     case EndKind::isotropic:
-      return gatherBy<light, EndKind::isotropic>(l, to, seen, near);
+      return body(Kind<EndKind::isotropic>());
     case EndKind::henyeyGreenstein:
-      return gatherBy<light, EndKind::henyeyGreenstein>(l, to, seen, near);
+      return body(Kind<EndKind::henyeyGreenstein>());
   }
 }
 
@@ -31,14 +28,39 @@ void gatherFrom(const KernelLight& l, const KernelReceivers& to, EndKind kind, c
 
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near) {
-  switch (from) {
-    case EndKind::lambertian:
-      return gatherFrom<EndKind::lambertian>(light, to, kind, seen, near);
-    case EndKind::isotropic:
-      return gatherFrom<EndKind::isotropic>(light, to, kind, seen, near);
-    case EndKind::henyeyGreenstein:
-      return gatherFrom<EndKind::henyeyGreenstein>(light, to, kind, seen, near);
-  }
+  withKind(from, [&](auto f) {
+    withKind(kind, [&](auto k) {
+      if (near.kind == NearField::Kind::clamped)
+        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seen[0], seen[1], seen[2], near.bound);
+      else
+        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seen[0], seen[1], seen[2], near.bound);
+    });
+  });
+}
+
+namespace {
+
+template <class Between>
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const Between& between, const KernelShadowMap& map, const NearField& near) {
+  withKind(from, [&](auto f) {
+    withKind(kind, [&](auto k) {
+      if (near.kind == NearField::Kind::clamped)
+        kernels::gatherThrough<f.value, k.value, NearField::Kind::clamped>(light, to, between, map, near.bound);
+      else
+        kernels::gatherThrough<f.value, k.value, NearField::Kind::spread>(light, to, between, map, near.bound);
+    });
+  });
+}
+
+}  // namespace
+
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near) {
+  if (table)
+    gatherThrough(light, from, to, kind, kernels::TableBetween{*table}, map, near);
+  else
+    gatherThrough(light, from, to, kind, kernels::FogBetween{sigmaT}, map, near);
 }
 
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {
@@ -84,6 +106,25 @@ void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scal
   alignas(64) float most[RayPacket::kSize];
   for (int i = 0; i < RayPacket::kSize; ++i) most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
   aimFromMedia(lamp, at, most, scale, rays);
+}
+
+void marchEyes(const KernelGrid& grid, KernelEyes& eyes, KernelDepths& depths) { kernels::march(grid, eyes, depths); }
+
+void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place, EyePoints& at) {
+  kernels::pointsAt(eyes, depths, place, at);
+}
+
+void lookUpDepths(const KernelEyes& eyes, const KernelDepths& depths, int lane, const float* places, int count,
+                  float* out) {
+  kernels::depthsAlong(eyes, depths, lane, places, count, out);
+}
+
+void lightEyes(const LampPoint& lamp, const KernelEyes& eyes, const EyePoints& at, float anisotropy, float scale,
+               float* value, RayPacket& rays) {
+  kernels::lampAtPoints(lamp, eyes, at, anisotropy, value);
+  for (int i = 0; i < RayPacket::kSize; ++i)
+    value[i] = at.weight[0][i] + at.weight[1][i] + at.weight[2][i] > 0 ? value[i] : 0.f;
+  aimFromMedia(lamp, at, value, scale, rays);
 }
 
 }  // namespace virga

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 
 #include "core/host_device.h"
 
@@ -76,6 +78,15 @@ namespace kernels {
 
 constexpr float kInverse4Pi = 0.07957747154594767f;
 
+/// exp(-x) of x >= 0, relative error 3e-7: in loops that hold more than an exponential a call of the library's vector
+/// code would send all that is in registers to memory.
+VIRGA_HD static inline float falling(float x) {
+  const float t = std::fmin(x, 87.f) * -1.4426950f, whole = std::rint(t), f = (t - whole) * 0.69314718f;
+  // The exponential's series for |f| <= log(2) / 2.
+  const float series = 1 + f * (1 + f * (1 / 2.f + f * (1 / 6.f + f * (1 / 24.f + f * (1 / 120.f + f * (1 / 720.f))))));
+  return series * std::bit_cast<float>((static_cast<int32_t>(whole) + 127) << 23);
+}
+
 /// Cosine and scattering of an end, `c` the cosine between its axis and the way to the other end.
 template <EndKind kind>
 VIRGA_HD static inline float endCosine(float c) {
@@ -96,6 +107,18 @@ VIRGA_HD static inline float spreadFalloff(float d2, float bound) {
   return s < 1 ? bound * (9 + s * (7 * s - 15)) : 1 / d2;
 }
 
+/// Light at a receiver from the light at (x, y, z) from it, `inverse` over that distance: over the light's weight and
+/// what lies between them. `cr`: cosine at the receiver.
+template <EndKind light, EndKind receiver, NearField::Kind near>
+VIRGA_HD static inline float connected(const KernelLight& l, float x, float y, float z, float d2, float inverse,
+                                       float cr, float anisotropy, float bound) {
+  const float cl = -(l.ax * x + l.ay * y + l.az * z) * inverse;
+  const float cosines = endCosine<light>(cl) * endCosine<receiver>(cr);
+  const float term = near == NearField::Kind::clamped ? std::fmin(cosines * (inverse * inverse), bound)
+                                                      : cosines * spreadFalloff(d2, bound);
+  return term * endScattering<light>(cl, l.anisotropy) * endScattering<receiver>(cr, anisotropy);
+}
+
 /// One light, all receivers. `seen`: transmittance times visibility from the light to each of them, per channel.
 template <EndKind light, EndKind receiver, NearField::Kind near>
 VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const float* seenR,
@@ -111,13 +134,9 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
     const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i];
     const float d2 = x * x + y * y + z * z + 1e-20f;
     const float inverse = 1 / std::sqrt(d2);
-    const float cl = -(l.ax * x + l.ay * y + l.az * z) * inverse;
     const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
-    const float cosines = endCosine<light>(cl) * endCosine<receiver>(cr);
-    const float term = near == NearField::Kind::clamped ? std::fmin(cosines * (inverse * inverse), bound)
-                                                        : cosines * spreadFalloff(d2, bound);
-    const float value = term * endScattering<light>(cl, l.anisotropy) *
-                        endScattering<receiver>(cr, receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0);
+    const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
+    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound);
     r[i] += value * l.r * seenR[i];
     g[i] += value * l.g * seenG[i];
     b[i] += value * l.b * seenB[i];
@@ -129,7 +148,7 @@ VIRGA_HD static inline void seenThroughFog(const KernelPoint& l, const KernelRec
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
     const float x = l.x - to.px[i], y = l.y - to.py[i], z = l.z - to.pz[i];
-    seen[i] = std::exp(-sigmaT * std::sqrt(x * x + y * y + z * z));
+    seen[i] = falling(sigmaT * std::sqrt(x * x + y * y + z * z));
   }
 }
 
@@ -142,62 +161,116 @@ VIRGA_HD static inline void octahedral(float x, float y, float z, float& u, floa
   v = z >= 0 ? b : foldedB;
 }
 
-/// Sets `seen` to 0 where a light's shadow map says that a surface is in the way: ShadowMapsView::visible().
+/// What a shadow map says in a direction from its light.
+VIRGA_HD static inline float depthToward(const KernelShadowMap& map, float x, float y, float z) {
+  const auto size = static_cast<float>(map.resolution);
+  float u, v;
+  octahedral(x, y, z, u, v);
+  const int column = static_cast<int>(std::fmin((u + 1) * (0.5f * size), size - 1));
+  const int row = static_cast<int>(std::fmin((v + 1) * (0.5f * size), size - 1));
+  return map.depths[row * map.resolution + column];
+}
+
+/// Does it say that nothing is in the way? `cr`: cosine at a receiver of a kind (ShadowMapsView::visible()).
+template <EndKind receiver>
+VIRGA_HD static inline bool reaches(const KernelShadowMap& map, float depth, float distance, float cr) {
+  const float cosine = receiver == EndKind::lambertian ? std::fmax(std::fabs(cr), map.leastCosine) : 1;
+  return distance * (1 - std::fmin(map.bias / cosine, 0.5f)) <= depth;
+}
+
+/// Sets `seen` to 0 where a light's shadow map says that a surface is in the way.
 template <EndKind receiver>
 VIRGA_HD static inline void seenThroughMap(const KernelLight& l, const KernelReceivers& to, const KernelShadowMap& map,
                                            float* seen) {
-  const float* __restrict depths = map.depths;
-  const int resolution = map.resolution;
-  const auto size = static_cast<float>(resolution);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
     const float x = to.px[i] - l.px, y = to.py[i] - l.py, z = to.pz[i] - l.pz + 1e-10f;
     const float distance = std::sqrt(x * x + y * y + z * z);
-    float u, v;
-    octahedral(x, y, z, u, v);
-    const int column = static_cast<int>(std::fmin((u + 1) * (0.5f * size), size - 1));
-    const int row = static_cast<int>(std::fmin((v + 1) * (0.5f * size), size - 1));
-    const float depth = depths[row * resolution + column];
-    const float along = std::fabs(to.ax[i] * x + to.ay[i] * y + to.az[i] * z) / distance;
-    const float cosine = receiver == EndKind::lambertian ? std::fmax(along, map.leastCosine) : 1;
-    seen[i] = distance * (1 - std::fmin(map.bias / cosine, 0.5f)) <= depth ? seen[i] : 0;
+    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) / distance;
+    seen[i] = reaches<receiver>(map, depthToward(map, x, y, z), distance, cr) ? seen[i] : 0;
   }
+}
+
+/// Optical depth that a point's table knows toward (x, y, z) from it, `inverse` over that distance.
+VIRGA_HD static inline float depthToward(const DepthTable& table, float x, float y, float z, float distance,
+                                         float inverse) {
+  const DepthView& f = table.view;
+  const float* __restrict depth = table.depth;
+  const float* __restrict right = depth + table.radii;
+  const float* __restrict below = depth + table.radii * table.side;
+  const float* __restrict across = below + table.radii;
+  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
+  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
+  const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
+  const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
+  const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
+  float u, v;
+  octahedral(a * turned, b * turned, c, u, v);
+  u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
+  const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
+  const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
+  const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
+  const auto radius = static_cast<float>(static_cast<int>(m));
+  const float fu = u - column, fv = v - row, fm = m - radius;
+  // In floats, which know all integers below 2^24: vector code multiplies them faster.
+  const int at = static_cast<int>((row * columns + column) * distances + radius);
+  const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
+  const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
+  const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
+  const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
+  return (d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv;
 }
 
 /// Multiplies `seen` by the transmittance that a point's table knows.
 VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelReceivers& to, const DepthTable& table,
                                              float* seen) {
-  const float* __restrict depth = table.depth;
-  const float* __restrict right = depth + table.radii;
-  const float* __restrict below = depth + table.radii * table.side;
-  const float* __restrict across = below + table.radii;
-  const DepthView f = table.view;
-  const auto columns = static_cast<float>(table.side), distances = static_cast<float>(table.radii);
-  const float scale = (distances - 1) * (distances - 1) / (f.last - f.first);
 #pragma omp simd
   for (int i = 0; i < to.count; ++i) {
     const float x = to.px[i] - l.x, y = to.py[i] - l.y, z = to.pz[i] - l.z + 1e-10f;
-    const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / distance;
-    const float a = (f.ux * x + f.uy * y + f.uz * z) * inverse, b = (f.vx * x + f.vy * y + f.vz * z) * inverse;
-    const float c = std::fmax(1 - (1 - (f.wx * x + f.wy * y + f.wz * z) * inverse) * f.stretch, -1.f);
-    const float turned = std::sqrt(std::fmax(1 - c * c, 0.f) / (a * a + b * b + 1e-20f));
-    float u, v;
-    octahedral(a * turned, b * turned, c, u, v);
-    u = (u + 1) * (0.5f * (columns - 1)), v = (v + 1) * (0.5f * (columns - 1));
-    const float m = std::fmin(std::sqrt(std::fmax(distance - f.first, 0.f) * scale), distances - 1.001f);
-    const auto column = static_cast<float>(static_cast<int>(std::fmin(u, columns - 1.001f)));
-    const auto row = static_cast<float>(static_cast<int>(std::fmin(v, columns - 1.001f)));
-    const auto radius = static_cast<float>(static_cast<int>(m));
-    const float fu = u - column, fv = v - row, fm = m - radius;
-    // In floats, which know all integers below 2^24: vector code multiplies them faster.
-    const int at = static_cast<int>((row * columns + column) * distances + radius);
-    const float d00 = depth[at] * (1 - fm) + depth[at + 1] * fm;
-    const float d01 = right[at] * (1 - fm) + right[at + 1] * fm;
-    const float d10 = below[at] * (1 - fm) + below[at + 1] * fm;
-    const float d11 = across[at] * (1 - fm) + across[at + 1] * fm;
-    seen[i] *= std::exp(-((d00 * (1 - fu) + d01 * fu) * (1 - fv) + (d10 * (1 - fu) + d11 * fu) * fv));
+    const float distance = std::sqrt(x * x + y * y + z * z);
+    seen[i] *= falling(depthToward(table, x, y, z, distance, 1 / distance));
   }
 }
+
+/// gather() through grey media and the light's shadow map at once: most frames spend their time here.
+template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
+VIRGA_HD static inline void gatherThrough(const KernelLight& l, const KernelReceivers& to, const Between between,
+                                          const KernelShadowMap map, float bound) {
+  const float* __restrict px = to.px;
+  const float* __restrict py = to.py;
+  const float* __restrict pz = to.pz;
+  float* __restrict r = to.r;
+  float* __restrict g = to.g;
+  float* __restrict b = to.b;
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i] - 1e-10f;
+    const float d2 = x * x + y * y + z * z + 1e-20f;
+    const float inverse = 1 / std::sqrt(d2), distance = d2 * inverse;
+    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
+    const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
+    const bool seen = reaches<receiver>(map, depthToward(map, -x, -y, -z), distance, cr);
+    const float through = falling(between.depth(-x, -y, -z, distance, inverse));
+    const float value =
+        connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound) * (seen ? through : 0.f);
+    r[i] += value * l.r, g[i] += value * l.g, b[i] += value * l.b;
+  }
+}
+
+/// What lies between: a fog that is everywhere...
+struct FogBetween {
+  float sigmaT;
+
+  VIRGA_HD float depth(float, float, float, float distance, float) const { return sigmaT * distance; }
+};
+/// ...or what the light's table knows.
+struct TableBetween {
+  DepthTable table;
+
+  VIRGA_HD float depth(float x, float y, float z, float distance, float inverse) const {
+    return depthToward(table, x, y, z, distance, inverse);
+  }
+};
 
 }  // namespace kernels
 
@@ -206,6 +279,10 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
 /// Adds the light of `light` to all receivers, seen by `seen[channel]`, arrays of `to.count` transmittances.
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near);
+/// gatherLight() through the light's shadow map and what its table knows or, without one, a fog of sigmaT [1/unit] that
+/// is everywhere.
+void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
+                   const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near);
 /// exp(-sigmaT d) for each receiver.
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen);
 /// Multiplies `seen` by 1 or 0: what the light's shadow map says.

@@ -140,12 +140,25 @@ void FrameLights::makeMaps(const Scene& scene, const Options& options, const std
   });
 }
 
+KernelShadowMap FrameLights::mapOf(size_t i) const {
+  return {&maps_[i * texelsOfMap()], mapSide_, ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_),
+          ShadowMapsView::kLeastCosine};
+}
+
+bool FrameLights::gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const {
+  if (!between_.grey() || maps_.empty()) return false;
+  const Light& light = lights_[i];
+  const bool looksUp = between_.kind() == MediaBetween::Kind::tables;
+  const DepthTable table = looksUp ? between_.table(i, 0) : DepthTable{};
+  gatherThrough(light.kernel, light.kind, to, kind, looksUp ? &table : nullptr, between_.fog().r, mapOf(i), near);
+  return true;
+}
+
 void FrameLights::lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const {
   const KernelLight& light = lights_[i].kernel;
   between_.look(i, to, seen);
   if (maps_.empty()) return;
-  const KernelShadowMap map{&maps_[i * texelsOfMap()], mapSide_,
-                            ShadowMapsView::kBias * 2 / static_cast<float>(mapSide_), ShadowMapsView::kLeastCosine};
+  const KernelShadowMap map = mapOf(i);
   lookThroughMap(light, to, kind, map, seen[0]);
   for (int c = 1; c < 3; ++c)
     if (seen[c] != seen[0]) lookThroughMap(light, to, kind, map, seen[c]);

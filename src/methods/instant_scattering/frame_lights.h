@@ -45,8 +45,12 @@ class FrameLights {
   /// shadow maps. `seen` points to three arrays of to.count values; on return the second and the third may be the same
   /// as the first.
   void lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const;
+  /// Does all that lookFrom() and gatherLight() would, for a plain light; false, and nothing done, where media are not
+  /// grey or there are no shadow maps.
+  bool gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const;
 
  private:
+  KernelShadowMap mapOf(size_t i) const;
   size_t texelsOfMap() const { return static_cast<size_t>(mapSide_) * static_cast<size_t>(mapSide_); }
   void makeMaps(const Scene& scene, const Options& options, const std::stop_token& stop);
 

@@ -4,8 +4,7 @@
 namespace virga {
 
 CameraRay FramePixels::cameraRay(int x, int y) const {
-  const Vec2 offset = scene_.filter.sample(numbers_.place());
-  return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset.x, static_cast<float>(y) + 0.5f + offset.y);
+  return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset_.x, static_cast<float>(y) + 0.5f + offset_.y);
 }
 
 void FramePixels::direct(Block& block) const {
@@ -16,12 +15,34 @@ void FramePixels::direct(Block& block) const {
     packet.set(static_cast<int>(i), cameras[i].ray, cameras[i].tMax);
   }
   const PacketHits hits = rays_.surfaces.nearest(packet);
+  block.smoke.clear();
+  for (size_t i = 0; i < block.count; ++i) meet(block, i, cameras[i], hits[i]);
+  block.smoke.march();
   for (size_t i = 0; i < block.count; ++i) {
-    marchEye(scene_.view, rays_, cameras[i], hits[i], numbers_.shift(), block.eyes[i], options_.eyeSteps);
-    block.features[i] = pixelFeatures(block.eyes[i]);
+    MarchedEye& eye = block.eyes[i];
+    const bool packed = block.smoke.has(i);
+    if (packed) eye.depth = block.smoke.depth(i);
+    block.features[i] = packed ? pixelFeatures(eye, block.smoke.meanPlace(i)) : pixelFeatures(eye);
     block.radiance[i] = {};
   }
-  packets_.add(std::span(block.eyes).first(block.count), std::span(block.radiance).first(block.count));
+  packets_.add(std::span(block.eyes).first(block.count), block.smoke, std::span(block.radiance).first(block.count));
+}
+
+void FramePixels::meet(Block& block, size_t i, const CameraRay& camera, const RayHit& hit) const {
+  MarchedEye& eye = block.eyes[i];
+  bool more = false;
+  walkEye(scene_.view, rays_, camera, hit, eye, [&](float t0, float t1) {
+    more = block.smoke.has(i);
+    if (more) return false;
+    if (eye.steps == 0 && packets_.lightSmoke() &&
+        block.smoke.add(scene_.view, i, eye.at.ray, eye.at.media, t0, t1, options_.eyeSteps, numbers_.shift())) {
+      return true;
+    }
+    return marchStretch(scene_.view, eye, t0, t1, numbers_.shift(), options_.eyeSteps);
+  });
+  if (!more) return;
+  block.smoke.remove(i);
+  marchEye(scene_.view, rays_, camera, hit, numbers_.shift(), eye, options_.eyeSteps);
 }
 
 template <class Visit>

@@ -22,6 +22,7 @@ class FramePixels {
         lights_(lights),
         options_(options),
         numbers_{pass},
+        offset_(scene.filter.sample(numbers_.place())),
         packets_(scene_, rays_, lamps, numbers_) {}
   FramePixels(const FramePixels&) = delete;
   FramePixels& operator=(const FramePixels&) = delete;
@@ -36,6 +37,7 @@ class FramePixels {
     size_t count = 0;
     std::vector<MarchedEye> eyes = std::vector<MarchedEye>(kSize);  ///< room for them
     std::array<PixelFeatures, kSize> features;                      ///< what is seen
+    EyePacket smoke;                                                ///< what of them goes side by side
     std::array<LayerRadiance, kSize> radiance;                      ///< light of x1 straight from lamps
   };
   /// Fills eyes, features and radiance. No light is found where an eye is not plain: where a mirror, glass or a narrow
@@ -46,6 +48,8 @@ class FramePixels {
   std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;
 
  private:
+  /// Fills eye number i of a block, or leaves its media to the block's packet.
+  void meet(Block& block, size_t i, const CameraRay& camera, const RayHit& hit) const;
   /// The points of a pixel's eye ray that are lit.
   template <class Visit>
   void visitReceivers(const MarchedEye& eye, Visit&& visit) const;
@@ -60,6 +64,7 @@ class FramePixels {
   const FrameLights& lights_;
   const ImsOptions& options_;
   FixedNumbers numbers_;
+  Vec2 offset_;          ///< of all camera rays from the middle of their pixel [pixels]
   LampPackets packets_;  ///< refers to the members above
 };
 

@@ -42,11 +42,13 @@ Ray rayOf(const RayPacket& rays, int i) {
 
 }  // namespace
 
-void LampPackets::add(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const {
+void LampPackets::add(std::span<const MarchedEye> eyes, const EyePacket& smoke,
+                      std::span<LayerRadiance> radiance) const {
   for (size_t i = 0; i < eyes.size(); ++i)
     if (eyes[i].plain) marched_.addEmission(eyes[i], radiance[i]);
   lightSurfaces(eyes, radiance);
   lightFog(eyes, radiance);
+  if (!smoke.empty()) lightSmoke(eyes, smoke, radiance);
   lightMedia(eyes, radiance);
 }
 
@@ -160,6 +162,34 @@ void LampPackets::lightFog(std::span<const MarchedEye> eyes, std::span<LayerRadi
       radiance[i].add(Layer::directMedia, found);
     }
   }
+}
+
+void LampPackets::lightSmoke(std::span<const MarchedEye> eyes, const EyePacket& smoke,
+                             std::span<LayerRadiance> radiance) const {
+  constexpr int kPoints = FixedNumbers::kPoints;
+  const KernelEyes& e = smoke.eyes();
+  if (e.from > e.to) return;
+  const auto* hg = smoke.medium().phase.get<HenyeyGreenstein>();
+  alignas(64) float sum[3][kSize] = {};
+  for (int n = 0; n < kPoints; ++n) {
+    const int k = n % LampPoints::kCount;
+    const LampPoint& lamp = lamps_.points().point[k];
+    if (!lamp.known) continue;
+    EyePoints at;
+    alignas(64) Lanes value;
+    RayPacket rays;
+    placePoints(e, smoke.depths(), (static_cast<float>(n) + numbers_.shift()) / kPoints, at);
+    lightEyes(lamp, e, at, hg ? hg->g : 0, scene_.scale, value, rays);
+    const Seen seen = see(k, at, rays, [&](int i) { return MediaRay{rayOf(rays, i), {}, 0}; });
+    const Rgb intensity = intensityOf(lamp);
+    for (int c = 0; c < 3; ++c)
+      for (int i = 0; i < kSize; ++i) sum[c][i] += at.weight[c][i] * value[i] * seen.channel[c][i] * intensity[c];
+  }
+  // Each lamp's intensity is shared by kCount points, whose turn comes kPoints / kCount times.
+  constexpr float kShare = static_cast<float>(LampPoints::kCount) / kPoints;
+  for (size_t i = 0; i < eyes.size(); ++i)
+    if (eyes[i].plain && smoke.has(i))
+      radiance[i].add(Layer::directMedia, Rgb(sum[0][i], sum[1][i], sum[2][i]) * smoke.medium().albedo * kShare);
 }
 
 void LampPackets::lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const {

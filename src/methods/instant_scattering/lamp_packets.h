@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "methods/instant_scattering/eye_packet.h"
 #include "methods/instant_scattering/frame_lamps.h"
 
 namespace virga {
@@ -18,8 +19,11 @@ class LampPackets {
   LampPackets(const Scene& scene, const EmbreeRays& rays, const FrameLamps& lamps, const FixedNumbers& numbers)
       : scene_(scene.view), rays_(rays), lamps_(lamps), numbers_(numbers), marched_(scene.view, rays) {}
 
-  /// Adds light of x1 to each radiance, for those eyes that are plain; kSize at most.
-  void add(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
+  /// Does add() know what to do with smoke?
+  bool lightSmoke() const { return lamps_.alone() && !lamps_.marches(); }
+  /// Adds light of x1 to each radiance, for those eyes that are plain; kSize at most. `smoke`: what it holds of them
+  /// is not in their steps.
+  void add(std::span<const MarchedEye> eyes, const EyePacket& smoke, std::span<LayerRadiance> radiance) const;
 
  private:
   using Lanes = float[kSize];
@@ -30,6 +34,7 @@ class LampPackets {
 
   void lightSurfaces(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
   void lightFog(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
+  void lightSmoke(std::span<const MarchedEye> eyes, const EyePacket& smoke, std::span<LayerRadiance> radiance) const;
   void lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
   /// Visibility times transmittance from a lamp's point to places, along the rays that were made for them.
   /// mediaRay(lane): such a ray, with the media at its start.

@@ -3,7 +3,7 @@
 
 #include "core/octahedral.h"
 #include "core/parallel.h"
-#include "methods/instant_scattering/eye_march.h"
+#include "methods/instant_scattering/eye_packet.h"
 #include "transport/media_bounds.h"
 #include "transport/virtual_lights.h"
 
@@ -95,33 +95,62 @@ MediaBetween::MediaBetween(const Scene& scene, std::vector<Vec3> points, const O
   VIRGA_ASSERT(sizeOfTable() < DepthTable::kMostSize);
   for (const Vec3 p : points_) views_.push_back(viewOf(media, p));
   depth_.resize(points_.size() * static_cast<size_t>(channels_) * sizeOfTable());
-  const auto rows = static_cast<int64_t>(points_.size()) * options_.side;
-  parallelFor(rows, 8, [&](int64_t i) {
-    if (!stop.stop_requested())
-      fillRow(scene, static_cast<size_t>(i / options_.side), static_cast<int>(i % options_.side));
+  const int packets = (options_.side * options_.side + EyePacket::kSize - 1) / EyePacket::kSize;
+  parallelFor(static_cast<int64_t>(points_.size()), 1, [&](int64_t i) {
+    const MediaState at = mediaAt(scene, points_[static_cast<size_t>(i)], endlessMedium(scene));
+    parallelFor(packets, 8, [&](int64_t n) {
+      if (!stop.stop_requested()) fill(scene, static_cast<size_t>(i), at, static_cast<size_t>(n) * EyePacket::kSize);
+    });
   });
 }
 
-void MediaBetween::fillRow(const Scene& scene, size_t i, int row) {
+void MediaBetween::fill(const Scene& scene, size_t i, const MediaState& media, size_t first) {
   const SceneView& view = scene.view;
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const MediaState media = mediaAt(scene, points_[i], endlessMedium(scene));
   const auto side = static_cast<size_t>(options_.side), radii = static_cast<size_t>(options_.radii);
-  float* table = &depth_[i * static_cast<size_t>(channels_) * sizeOfTable() + static_cast<size_t>(row) * side * radii];
+  const size_t count = std::min<size_t>(EyePacket::kSize, side * side - first);
   const int steps = options_.radii * 4 / 3;
   const std::vector<float> distances = radiiOf(views_[i], options_.radii);
-  MarchedDepth way;
-  for (int column = 0; column < options_.side; ++column, table += radii) {
-    MediaRay r{{points_[i], nodeDirection(views_[i], options_.side, column, row)}, media, 0};
-    way.clear();
+  float* const table = &depth_[i * static_cast<size_t>(channels_) * sizeOfTable() + first * radii];
+  EyePacket packet;
+  packet.clear();
+  const auto rayOf = [&](size_t n) {
+    const auto column = static_cast<int>((first + n) % side), row = static_cast<int>((first + n) / side);
+    return MediaRay{{points_[i], nodeDirection(views_[i], options_.side, column, row)}, media, 0};
+  };
+  for (size_t n = 0; n < count; ++n) {
+    MediaRay r = rayOf(n);
+    bool alone = false;  // its media are not for the packet
     walkMedia(view, rays, r, views_[i].last, [&](float t0, float t1) {
-      return marchMedia(view, r.media, r.ray, t0, t1, steps, 0, [&](float a, float b, Rgb depth) {
-        way.add(a, b, depth);
-        return true;
-      });
+      alone = !r.media.vacuum() && (packet.has(n) || !packet.add(view, n, r.ray, r.media, t0, t1, steps, 0));
+      return !alone;
     });
-    for (int c = 0; c < channels_; ++c) way.write(distances, c, table + static_cast<size_t>(c) * sizeOfTable());
+    if (!alone) continue;
+    packet.remove(n);
+    fillNode(scene, rayOf(n), distances, table + n * radii);
   }
+  packet.march();
+  for (size_t n = 0; n < count; ++n)
+    for (size_t c = 0; packet.has(n) && c < static_cast<size_t>(channels_); ++c) {
+      float* const out = table + c * sizeOfTable() + n * radii;
+      packet.depthsAt(n, distances, out);
+      for (size_t m = 0; channels_ > 1 && m < radii; ++m) out[m] *= packet.medium().spectrum[static_cast<int>(c)];
+    }
+}
+
+void MediaBetween::fillNode(const Scene& scene, MediaRay r, const std::vector<float>& distances, float* out) const {
+  const SceneView& view = scene.view;
+  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  const int steps = options_.radii * 4 / 3;
+  MarchedDepth way;
+  way.clear();
+  walkMedia(view, rays, r, distances.back(), [&](float t0, float t1) {
+    return marchMedia(view, r.media, r.ray, t0, t1, steps, 0, [&](float a, float b, Rgb depth) {
+      way.add(a, b, depth);
+      return true;
+    });
+  });
+  for (int c = 0; c < channels_; ++c) way.write(distances, c, out + static_cast<size_t>(c) * sizeOfTable());
 }
 
 void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) const {
@@ -135,10 +164,7 @@ void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) con
       lookThroughFog({p.x, p.y, p.z}, to, fog_[c], seen[c]);
     else
       std::fill_n(seen[c], to.count, 1.f);
-    const size_t table = i * static_cast<size_t>(channels_) + static_cast<size_t>(c);
-    if (kind_ == Kind::tables)
-      lookThroughTable({p.x, p.y, p.z}, to, {&depth_[table * sizeOfTable()], options_.side, options_.radii, views_[i]},
-                       seen[c]);
+    if (kind_ == Kind::tables) lookThroughTable({p.x, p.y, p.z}, to, table(i, c), seen[c]);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "methods/instant_scattering/frame_kernels.h"
 #include "scene/scene.h"
+#include "transport/media_walk.h"
 
 namespace virga {
 
@@ -26,6 +27,15 @@ class MediaBetween {
   MediaBetween(const Scene& scene, std::vector<Vec3> points, const Options& options, const std::stop_token& stop);
 
   Kind kind() const { return kind_; }
+  /// All of them are the same for all channels.
+  bool grey() const { return channels_ == 1; }
+  /// Extinction of the fog that is everywhere [1/unit]; 0 without one.
+  Rgb fog() const { return kind_ == Kind::fog ? fog_ : Rgb(); }
+  /// Of point number i, where there are tables.
+  DepthTable table(size_t i, int channel) const {
+    const size_t number = i * static_cast<size_t>(channels_) + static_cast<size_t>(channel);
+    return {&depth_[number * sizeOfTable()], options_.side, options_.radii, views_[i]};
+  }
   /// From point number i to receivers, for each channel. `seen` points to three arrays of to.count values; on return
   /// the second and the third may be the same as the first.
   void look(size_t i, const KernelReceivers& to, float* seen[3]) const;
@@ -35,7 +45,10 @@ class MediaBetween {
     return static_cast<size_t>(options_.side) * static_cast<size_t>(options_.side) *
            static_cast<size_t>(options_.radii);
   }
-  void fillRow(const Scene& scene, size_t i, int row);
+  /// Some nodes' directions from point number i, which lies in these media.
+  void fill(const Scene& scene, size_t i, const MediaState& media, size_t first);
+  /// One of them by itself.
+  void fillNode(const Scene& scene, MediaRay r, const std::vector<float>& distances, float* out) const;
 
   Options options_;
   Kind kind_ = Kind::nothing;

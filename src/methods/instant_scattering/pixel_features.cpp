@@ -7,8 +7,11 @@
 namespace virga {
 namespace {
 
-/// Mean of t in [0, 1] by exp(-depth t): 1 / depth - 1 / (exp(depth) - 1), or its series up to an error of 4e-5.
-float meanDistance(float d) { return d > 1 ? 1 / d - 1 / std::expm1(d) : 0.5f - d / 12 + d * d * d / 720; }
+/// Mean of t in [0, 1] by exp(-d t): 1 / d - 1 / (exp(d) - 1), or its series up to an error of 4e-5. `before` and
+/// `after`: the transmittances to both ends of the step.
+float meanDistance(float d, float before, float after) {
+  return d > 1 && before > after ? 1 / d - after / (before - after) : 0.5f - d / 12 + d * d * d / 720;
+}
 
 /// Of what is seen of the media, by the mean of the channels; 0 if nothing is.
 float meanDepth(const MarchedEye& eye) {
@@ -20,7 +23,7 @@ float meanDepth(const MarchedEye& eye) {
     depth += own;
     const float after = std::exp(-depth), seen = before - after;
     weight += static_cast<double>(seen);
-    moment += static_cast<double>(seen * lerp(step.t0, step.t1, meanDistance(own)));
+    moment += static_cast<double>(seen * lerp(step.t0, step.t1, meanDistance(own, before, after)));
     before = after;
   }
   return weight > 0 ? static_cast<float>(moment / weight) : 0;
@@ -35,13 +38,15 @@ Rgb reflectanceOf(const Side& side) {
 
 }  // namespace
 
-PixelFeatures pixelFeatures(const MarchedEye& eye) {
+PixelFeatures pixelFeatures(const MarchedEye& eye) { return pixelFeatures(eye, meanDepth(eye)); }
+
+PixelFeatures pixelFeatures(const MarchedEye& eye, float mediaDepth) {
   PixelFeatures f;
   f.regular = true;
   f.depth = eye.hit.found() ? eye.hit.t : kInfinity;
   const Rgb transmittance = transmittanceOf(eye.depth);
   f.opacity = Rgb(1.f) - transmittance;
-  f.mediaDepth = meanDepth(eye);
+  f.mediaDepth = mediaDepth;
   if (!eye.hit.found()) return f;
   f.regular = !eye.side.bsdf->specular() && !eye.side.bsdf->isThin();
   f.p = eye.point.p;

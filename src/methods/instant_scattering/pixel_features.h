@@ -18,6 +18,8 @@ struct PixelFeatures {
 
 /// Of an eye ray.
 PixelFeatures pixelFeatures(const MarchedEye& eye);
+/// Of one whose steps were not kept; `mediaDepth` as above.
+PixelFeatures pixelFeatures(const MarchedEye& eye, float mediaDepth);
 /// Marches the ray through the middle of pixel (x, y). Nothing is random; the steps of neighbours are shifted against
 /// each other, so that what they miss does not add up to a pattern.
 void marchMiddle(const Scene& scene, int x, int y, int steps, MarchedEye& eye);

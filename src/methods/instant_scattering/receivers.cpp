@@ -65,6 +65,9 @@ void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const 
       const FrameLights::Light& from = lights.lights()[i];
       for (Group& group : groups_) {
         if (group.px.empty()) continue;
+        if (from.plain && group.plain && options.visibility == Visibility::maps &&
+            lights.gatherAtOnce(i, group.view(), group.kind, options.near))
+          continue;
         float* seen[3] = {group.seen[0].data(), group.seen[1].data(), group.seen[2].data()};
         look(scene, lights, i, group, options, seen);
         if (from.plain && group.plain)

@@ -64,8 +64,8 @@ struct Upsampling::Filter {
   }
 };
 
-Upsampling::Upsampling(std::vector<PixelFeatures> features, int width, int height, int spacing)
-    : features_(std::move(features)),
+Upsampling::Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing)
+    : features_(features),
       width_(width),
       height_(height),
       spacing_(spacing),
@@ -75,29 +75,14 @@ Upsampling::Upsampling(std::vector<PixelFeatures> features, int width, int heigh
       blocksAcross_((columns_ + 1) * blocksPerCell_),
       blocksDown_((rows_ + 1) * blocksPerCell_) {
   for (int t = 0; t < spacing; ++t) splines_.push_back(spline(static_cast<float>(t) / static_cast<float>(spacing)));
-  own_.assign(features_.size(), kFiltered);
-  const auto compute = [&](int x, int y) {
-    own_[numberOf(x, y)] = static_cast<uint32_t>(computed_.size());
-    computed_.push_back({x, y});
-  };
   for (int j = 0; j < rows_; ++j)
-    for (int i = 0; i < columns_; ++i)
-      compute(std::min(i * spacing + spacing / 2, width - 1), std::min(j * spacing + spacing / 2, height - 1));
-  const std::vector<UpsamplingTap> taps = tapsOf(nullptr);
-  std::vector<uint8_t> needed(features_.size());
-  parallelFor(int64_t{blocksAcross_} * blocksDown_, 1, [&](int64_t n) {
-    const PixelBlock block = blockOf(n);
-    if (block.count == 0) return;
-    const Filter filter(*this, block, taps);
-    for (int i = 0; i < block.count; ++i) {
-      const auto [x, y] = block.pixel[i];
-      needed[numberOf(x, y)] =
-          needsOwn(features_[numberOf(x, y)], filter.weights.surfaceSum[i], filter.weights.mediaSum[i]);
-    }
-  });
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      if (needed[numberOf(x, y)] && own_[numberOf(x, y)] == kFiltered) compute(x, y);
+    for (int i = 0; i < columns_; ++i) coarse_.push_back({middleOf(i, width), middleOf(j, height)});
+}
+
+std::vector<Upsampling::Pixel> Upsampling::joined(const std::vector<std::vector<Pixel>>& lists) {
+  std::vector<Pixel> all;
+  for (const std::vector<Pixel>& list : lists) all.insert(all.end(), list.begin(), list.end());
+  return all;
 }
 
 bool Upsampling::needsOwn(const PixelFeatures& f, float surfaceSum, float mediaSum) const {
@@ -128,24 +113,23 @@ const std::array<float, 4>& Upsampling::splineAt(int place) const {
   return splines_[static_cast<size_t>(place - spacing_ / 2)];
 }
 
-std::vector<UpsamplingTap> Upsampling::tapsOf(const std::vector<Light>* light) const {
+std::vector<UpsamplingTap> Upsampling::tapsOf(std::span<const Light> light) const {
   std::vector<UpsamplingTap> taps;
-  for (size_t n = 0; n < static_cast<size_t>(columns_) * static_cast<size_t>(rows_); ++n) {
-    const Pixel p = computed_[n];
-    UpsamplingTap& tap = taps.emplace_back(tapOf(features_[numberOf(p.x, p.y)]));
-    if (!light) continue;
+  for (size_t n = 0; n < coarse_.size(); ++n) {
+    UpsamplingTap& tap = taps.emplace_back(tapOf(features_[numberOf(coarse_[n].x, coarse_[n].y)]));
     for (size_t l = 0; l < 2; ++l)
-      for (int c = 0; c < 3; ++c)
-        tap.surface[l][c] = (*light)[n].surface[l][c], tap.media[l][c] = (*light)[n].media[l][c];
+      for (int c = 0; c < 3; ++c) tap.surface[l][c] = light[n].surface[l][c], tap.media[l][c] = light[n].media[l][c];
   }
   return taps;
 }
 
-Upsampling::BlockLight Upsampling::lightOf(const PixelBlock& pixels, const std::vector<UpsamplingTap>& all) const {
+void Upsampling::lightBlock(const PixelBlock& pixels, const std::vector<UpsamplingTap>& all, BlockLight& light) const {
   const Filter filter(*this, pixels, all);
-  BlockLight light;
+  for (int i = 0; i < pixels.count; ++i) {
+    const PixelFeatures& own = features_[numberOf(pixels.pixel[i].x, pixels.pixel[i].y)];
+    light.known[i] = !needsOwn(own, filter.weights.surfaceSum[i], filter.weights.mediaSum[i]);
+  }
   spreadLight(filter.block, filter.taps, filter.weights, light.filtered);
-  return light;
 }
 
 }  // namespace virga

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -21,16 +23,16 @@ namespace virga {
 /// exactly (reflectance and transmittance; opacity): the filter works on the light without it.
 class Upsampling {
  public:
-  /// Of the whole picture; `spacing` >= 1 pixels.
-  Upsampling(std::vector<PixelFeatures> features, int width, int height, int spacing);
+  /// `features` of the whole picture, which must outlive it; `spacing` >= 1 pixels.
+  Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing);
 
   struct Pixel {
     int x, y;
   };
-  /// The pixels to compute, coarse ones row by row, then those that no coarse one agrees with.
-  const std::vector<Pixel>& computed() const { return computed_; }
+  /// The pixels to compute first, row by row.
+  const std::vector<Pixel>& coarse() const { return coarse_; }
 
-  /// Light of a computed pixel that was last scattered by a surface or in a medium, in two layers each: x2 a surface,
+  /// Light of a pixel that was last scattered by a surface or in a medium, in two layers each: x2 a surface,
   /// x2 in a medium.
   struct Light {
     std::array<Rgb, 2> surface, media;
@@ -41,32 +43,42 @@ class Upsampling {
         media[l] += radiance.value[static_cast<int>(kInMedia[l])] * share;
       }
     }
-    void addTo(LayerRadiance& radiance) const {
-      for (size_t l = 0; l < 2; ++l) radiance.add(kOnSurface[l], surface[l]), radiance.add(kInMedia[l], media[l]);
+    /// add(layer, radiance).
+    template <class Add>
+    void visit(const Add& add) const {
+      for (size_t l = 0; l < 2; ++l) add(kOnSurface[l], surface[l]);
+      for (size_t l = 0; l < 2; ++l) add(kInMedia[l], media[l]);
     }
     static constexpr Layer kOnSurface[2] = {Layer::surfaceToSurface, Layer::mediaToSurface};
     static constexpr Layer kInMedia[2] = {Layer::surfaceToMedia, Layer::mediaToMedia};
   };
 
-  /// body(x, y, light) for every pixel of the picture, in parallel and in any order, from the light of all computed
-  /// pixels in their order. A stop leaves pixels out.
+  /// body(x, y, light) for the pixels of the picture, in parallel and in any order, from the light of all coarse ones
+  /// in their order. Returns the pixels that no coarse one agrees with, which must be computed as well. A stop leaves
+  /// pixels out.
   template <class Body>
-  void spread(const std::vector<Light>& computed, const std::stop_token& stop, const Body& body) const {
-    const std::vector<UpsamplingTap> taps = tapsOf(&computed);
-    parallelFor(int64_t{blocksAcross_} * blocksDown_, 1, [&](int64_t n) {
+  std::vector<Pixel> spread(std::span<const Light> coarse, const std::stop_token& stop, const Body& body) const {
+    const std::vector<UpsamplingTap> taps = tapsOf(coarse);
+    std::vector<std::vector<Pixel>> others(static_cast<size_t>(blocksAcross_) * static_cast<size_t>(blocksDown_));
+    parallelFor(static_cast<int64_t>(others.size()), 1, [&](int64_t n) {
       const PixelBlock block = blockOf(n);
       if (block.count == 0 || stop.stop_requested()) return;
-      const BlockLight light = lightOf(block, taps);
-      for (int i = 0; i < block.count && !stop.stop_requested(); ++i) {
+      BlockLight light;
+      lightBlock(block, taps, light);
+      for (int i = 0; i < block.count; ++i) {
         const auto [x, y] = block.pixel[i];
-        body(x, y, light.at(i, computed, ownOf(x, y)));
+        if (const auto own = irregularCoarse(x, y))
+          body(x, y, coarse[*own]);
+        else if (light.known[i])
+          body(x, y, light.at(i));
+        else
+          others[static_cast<size_t>(n)].push_back({x, y});
       }
     });
+    return joined(others);
   }
 
  private:
-  static constexpr uint32_t kFiltered = ~0u;  ///< a pixel that is not computed, or that is filtered all the same
-
   /// Pixels between the same coarse ones.
   struct PixelBlock {
     int column, row;  ///< of the first of these
@@ -75,9 +87,9 @@ class Upsampling {
   };
   struct BlockLight {
     UpsampledLight filtered;
+    bool known[UpsamplingBlock::kPixels];  ///< a coarse pixel agrees
 
-    Light at(int i, const std::vector<Light>& computed, uint32_t own) const {
-      if (own != kFiltered) return computed[own];
+    Light at(int i) const {
       Light light;
       for (size_t l = 0; l < 2; ++l)
         for (int c = 0; c < 3; ++c)
@@ -89,30 +101,33 @@ class Upsampling {
   PixelBlock blockOf(int64_t n) const;
   /// Weights of four coarse columns (or rows), a pixel's place counted from the start of the second one's cell.
   const std::array<float, 4>& splineAt(int place) const;
-  /// Of the coarse pixels; without light if there is none yet.
-  std::vector<UpsamplingTap> tapsOf(const std::vector<Light>* light) const;
+  /// Of the coarse pixels.
+  std::vector<UpsamplingTap> tapsOf(std::span<const Light> light) const;
   struct Filter;
-  BlockLight lightOf(const PixelBlock& pixels, const std::vector<UpsamplingTap>& taps) const;
+  void lightBlock(const PixelBlock& pixels, const std::vector<UpsamplingTap>& taps, BlockLight& light) const;
+  static std::vector<Pixel> joined(const std::vector<std::vector<Pixel>>& lists);
   bool needsOwn(const PixelFeatures& features, float surfaceSum, float mediaSum) const;
 
   size_t numberOf(int x, int y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }
-  /// The number of its own light, if that is to be taken.
-  uint32_t ownOf(int x, int y) const {
-    const uint32_t own = own_[numberOf(x, y)];
-    const bool coarse = own < static_cast<uint32_t>(columns_ * rows_);
-    return coarse && features_[numberOf(x, y)].regular ? kFiltered : own;
+  /// Its number, if it is a coarse pixel of which nothing can be said: its own light is taken.
+  std::optional<size_t> irregularCoarse(int x, int y) const {
+    if (features_[numberOf(x, y)].regular) return std::nullopt;
+    const int i = x / spacing_, j = y / spacing_;
+    if (x != middleOf(i, width_) || y != middleOf(j, height_)) return std::nullopt;
+    return static_cast<size_t>(j) * static_cast<size_t>(columns_) + static_cast<size_t>(i);
   }
+  /// Where coarse column (or row) number i lies in a picture of so many pixels.
+  int middleOf(int i, int size) const { return std::min(i * spacing_ + spacing_ / 2, size - 1); }
 
-  std::vector<PixelFeatures> features_;
+  std::span<const PixelFeatures> features_;
   int width_, height_, spacing_;
   int columns_, rows_;  ///< of coarse pixels
   int blocksPerCell_;   ///< in either direction
   int blocksAcross_, blocksDown_;
   std::vector<std::array<float, 4>> splines_;  ///< at each place between two coarse columns
-  std::vector<Pixel> computed_;
-  std::vector<uint32_t> own_;  ///< of each pixel: its place among the computed ones, or kFiltered
+  std::vector<Pixel> coarse_;
 };
 
 }  // namespace virga

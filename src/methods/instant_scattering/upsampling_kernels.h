@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/host_device.h"
+#include "methods/instant_scattering/frame_kernels.h"
 
 namespace virga {
 
@@ -60,8 +61,8 @@ VIRGA_HD static inline void weigh(const UpsamplingBlock& b, const UpsamplingTap&
     const float turned = (1 - (b.nx[i] * t.nx + b.ny[i] * t.ny + b.nz[i] * t.nz)) / kNormalWidth;
     const float apart = (b.mediaDepth[i] - t.mediaDepth) / (kMediaDepthWidth * leastMedia + 1e-30f);
     const float denser = (b.opacity[i] - t.opacity) / kOpacityWidth;
-    const float s = std::exp(-0.5f * std::fmin(off * off + turned * turned, 100.f));
-    const float m = std::exp(-0.5f * std::fmin(apart * apart + denser * denser, 100.f));
+    const float s = falling(0.5f * (off * off + turned * turned));
+    const float m = falling(0.5f * (apart * apart + denser * denser));
     surface[i] = nearest > 0 ? spline * s : 0.f;
     media[i] = leastMedia > 0 ? spline * m : 0.f;
   }

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+// What frames of instant multiple scattering are made of: kernels, packets of eye rays, lights.
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "methods/ims_scenes.h"
+#include "methods/instant_scattering/frame_lights.h"
+#include "methods/instant_scattering/lamp_packets.h"
+#include "methods/instant_scattering/pixel_features.h"
+#include "methods/rendering.h"
+#include "volume/grid.h"
+#include "volume/lookup_along.h"
+#include "volume/procedural.h"
+
+namespace virga {
+namespace {
+
+using namespace virga::testing;
+
+TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
+  const float bound = 4, radius = 0.5f;  // 1 / sqrt(bound)
+  double spread = 0;
+  const int n = 100000;
+  for (int i = 0; i < n; ++i) {
+    const float d = radius * (static_cast<float>(i) + 0.5f) / n;
+    spread += static_cast<double>(kernels::spreadFalloff(d * d, bound) * d * d) * static_cast<double>(radius) / n;
+  }
+  EXPECT_NEAR(spread, static_cast<double>(radius), 1e-4);  // as does 1 / d^2
+  EXPECT_NEAR(kernels::spreadFalloff(0.2499f, bound), kernels::spreadFalloff(0.2501f, bound), 0.01f);
+}
+
+TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
+  LampPoint lamp;
+  lamp.known = true, lamp.px = 0.3f, lamp.py = 0.5f, lamp.pz = -2;
+  lamp.all = 1;
+  FogRays fog{};  // the others are not there
+  fog.dz[3] = -1, fog.t0[3] = 0.5f, fog.t1[3] = 4;
+  fog.sigmaT[0][3] = 0.4f, fog.sigmaT[1][3] = 0.8f, fog.anisotropy[3] = 0.3f;
+  double truth = 0;
+  const int n = 200000;
+  for (int i = 0; i < n; ++i) {
+    const double t = 0.5 + 3.5 * (i + 0.5) / n, z = -2 + t, d2 = 0.34 + z * z, c = (t - 2) / std::sqrt(d2);
+    const double phase = (1 - 0.09) / (4 * 3.14159265358979 * std::pow(1.09 + 0.6 * c, 1.5));
+    truth += 0.4 * std::exp(-0.4 * (t - 0.5)) * phase / d2 * 3.5 / n;
+  }
+  KernelPlaces at;
+  RayPacket rays;
+  float value[3][RayPacket::kSize];
+  constexpr int kShifts = 64;
+  double sum = 0;
+  for (int shift = 0; shift < kShifts; ++shift) {
+    lightFog(lamp, fog, (static_cast<float>(shift) + 0.5f) / kShifts, 5, at, value, rays);
+    sum += static_cast<double>(value[0][3]) / kShifts;
+    EXPECT_EQ(value[2][3], 0);
+    EXPECT_EQ(value[0][0], 0);
+    EXPECT_GT(rays.tMax[3], 0);
+    EXPECT_EQ(rays.tMax[0], 0);
+  }
+  EXPECT_NEAR(sum, truth, 2e-3 * truth);
+}
+
+TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
+  DenseVolume volume = makeProcedural(ProceduralKind::smoke, {.resolution = 32});
+  const auto grid = Grid::dense(volume.nx, volume.ny, volume.nz, std::move(volume.values), {});
+  const GridView view = grid->view();
+  const Vec3 o(3, 28, 1), d(0.31f, -0.4f, 0.47f);
+  float out[60];
+  lookupAlong(view, o, d, 60, out);
+  for (int n = 0; n < 60; ++n) EXPECT_NEAR(out[n], view.lookup(o + d * static_cast<float>(n)), 1e-4f) << n;
+}
+
+TEST(FrameKernels, TheirExponentialIsExact) {
+  for (const float x : {0.f, 1e-6f, 0.3f, 0.35f, 1.f, 7.7f, 40.f, 80.f})
+    EXPECT_NEAR(kernels::falling(x) / std::exp(-x), 1, 2e-6) << x;
+  EXPECT_LT(kernels::falling(1e30f), 1e-37f);
+}
+
+// Rays side by side find what marchEye() finds for each, in smoke whose channels differ and beside it.
+TEST(EyePacket, MarchesAsEachRayByItself) {
+  const SceneSnapshot scene = sceneOf(plume(8));
+  SceneView view = scene->view;
+  std::vector<MediumView> media(view.media.begin(), view.media.end());
+  media.at(0).spectrum = {1, 0.5f, 0.2f};
+  view.media = {media.data(), view.media.size};
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  constexpr float kShift = 0.3f;
+  constexpr int kPoints = 4;
+  EyePacket packet;
+  packet.clear();
+  std::vector<MarchedEye> eyes(EyePacket::kSize);
+  for (size_t i = 0; i < eyes.size(); ++i) {
+    const float u = static_cast<float>(i % 4), v = static_cast<float>(i / 4);
+    const CameraRay camera{{{i == 7 ? 3 : 0.3f * u - 0.6f, 0.4f * v - 0.7f, 5}, normalize(Vec3(0.05f, 0.02f, -1))}, 9};
+    MarchedEye beside;
+    walkEye(view, rays, camera, rays.nearest(camera.ray, camera.tMax), beside,
+            [&](float t0, float t1) { return packet.add(view, i, camera.ray, beside.at.media, t0, t1, 100, kShift); });
+    marchEye(view, rays, camera, kShift, eyes[i], 100);
+    EXPECT_EQ(packet.has(i), i != 7);
+  }
+  packet.march();
+  int dense = 0;
+  std::vector<EyePoints> points(kPoints);
+  for (int k = 0; k < kPoints; ++k)
+    placePoints(packet.eyes(), packet.depths(), (static_cast<float>(k) + 0.4f) / kPoints,
+                points[static_cast<size_t>(k)]);
+  for (size_t i = 0; i < eyes.size(); ++i) {
+    for (int c = 0; packet.has(i) && c < 3; ++c)
+      EXPECT_NEAR(packet.depth(i)[c], eyes[i].depth[c], 1e-4f * eyes[i].depth[c] + 1e-6f);
+    if (!(eyes[i].opacity() > 0.01f)) continue;
+    ++dense;
+    EXPECT_NEAR(packet.meanPlace(i), pixelFeatures(eyes[i]).mediaDepth, 1e-3f);
+    eyes[i].visitPoints(kPoints, 0.4f, [&](int k, Vec3 p, Rgb weight, const MediaState&) {
+      const EyePoints& at = points[static_cast<size_t>(k)];
+      EXPECT_LT(length(Vec3(at.px[i], at.py[i], at.pz[i]) - p), 2e-3f);
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(at.weight[c][i], weight[c], 1e-3f * weight[c]);
+    });
+  }
+  EXPECT_GT(dense, 3) << "the test looks past the smoke";
+}
+
+/// What all lights bring to receivers of a kind, at once or step by step.
+std::vector<float> gathered(const FrameLights& lights, EndKind kind, bool atOnce) {
+  std::vector<float> p[3], axis[3], g(64, 0.4f), sum[3], seen[3];
+  for (int i = 0; i < 64; ++i)
+    for (int c = 0; c < 3; ++c) {
+      p[c].push_back(-0.9f + 0.6f * static_cast<float>((i >> 2 * c) % 4));
+      axis[c].push_back(c == i % 3 ? 1.f : 0.f), sum[c].push_back(0), seen[c].push_back(0);
+    }
+  const KernelReceivers to{
+      64,       p[0].data(),   p[1].data(),   p[2].data(),  axis[0].data(), axis[1].data(), axis[2].data(),
+      g.data(), sum[0].data(), sum[1].data(), sum[2].data()};
+  const NearField near{NearField::Kind::spread, 50};
+  for (size_t l = 0; l < lights.lights().size(); ++l) {
+    const FrameLights::Light& light = lights.lights()[l];
+    float* out[3] = {seen[0].data(), seen[1].data(), seen[2].data()};
+    if (atOnce) {
+      EXPECT_TRUE(lights.gatherAtOnce(l, to, kind, near));
+    } else {
+      lights.lookFrom(l, to, kind, out);
+      gatherLight(light.kernel, light.kind, to, kind, out, near);
+    }
+  }
+  return sum[1];
+}
+
+TEST(FrameLights, AllAtOnceIsStepByStep) {
+  const std::string room = fog(8);  // its fog ends at a cube, which comes last
+  const std::string inFog =
+      R"(<medium type="homogeneous" id="all"><float name="sigma_t" value="0.4"/><float name="albedo" value="0.9"/></medium>)" +
+      std::regex_replace(room.substr(0, room.find(R"(<shape type="cube">)")), std::regex("</sensor>"),
+                         R"(<ref name="medium" id="all"/></sensor>)");
+  for (const std::string& elements : {plume(8), inFog}) {
+    const SceneSnapshot scene = sceneOf(elements);
+    const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 1000}, {3, 0, 0, 0}), {.most = 100}, {});
+    for (const EndKind kind : {EndKind::lambertian, EndKind::isotropic, EndKind::henyeyGreenstein}) {
+      const std::vector<float> one = gathered(lights, kind, true), other = gathered(lights, kind, false);
+      double error = 0, sum = 0;
+      for (size_t i = 0; i < one.size(); ++i)
+        error += static_cast<double>(std::fabs(one[i] - other[i])), sum += static_cast<double>(other[i]);
+      EXPECT_GT(sum, 0);
+      EXPECT_LT(error, 2e-3 * sum);
+    }
+  }
+}
+
+// Tables of optical depths are near those that marching finds, from lights in the plume and on the floor.
+TEST(FrameLights, TablesKnowTheMedia) {
+  const SceneSnapshot scene = sceneOf(plume(8));
+  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}),
+                           {.most = 200, .shadows = FrameLights::ShadowMapping::none}, {});
+  ASSERT_GT(lights.lights().size(), 100u);
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  std::vector<float> x, y, z, none(64, 0.f), seen(64);
+  for (int i = 0; i < 64; ++i)
+    x.push_back(-0.9f + 0.6f * static_cast<float>(i % 4)), y.push_back(-0.9f + 0.6f * static_cast<float>(i / 4 % 4)),
+        z.push_back(-0.8f + 0.6f * static_cast<float>(i / 16));
+  const KernelReceivers to{64,          x.data(),    y.data(),    z.data(),    none.data(), none.data(),
+                           none.data(), none.data(), none.data(), none.data(), none.data()};
+  double error = 0, sum = 0;
+  for (size_t l = 0; l < lights.lights().size(); ++l) {
+    float* out[3] = {seen.data(), seen.data(), seen.data()};
+    lights.lookFrom(l, to, EndKind::isotropic, out);
+    const Vec3 from = lights.lights()[l].vertex->p + lights.lights()[l].vertex->normal * 1e-3f;
+    const MediaState media = mediaAt(*scene, from);
+    for (size_t i = 0; i < 64; ++i) {
+      const Vec3 way = Vec3(x[i], y[i], z[i]) - from;
+      const float d = length(way);
+      const float truth = marchedTransmittance(scene->view, rays, {{from, way / d}, media, 0}, d, 128, 0).g;
+      error += static_cast<double>(std::fabs(seen[i] - truth));
+      sum += static_cast<double>(truth);
+    }
+  }
+  EXPECT_LT(error, 0.06 * sum);
+}
+
+}  // namespace
+}  // namespace virga
