@@ -87,10 +87,11 @@ void FastRenderer::forget(const ChangeSet& changes) {
 
 View<LampTable> FastRenderer::lampTables(const Scene& scene, const ImsOptions& options, const std::stop_token& stop) {
   if (options.lampTable == 0 || !ImsPixels::marches(scene.view)) return {};
-  if (!tables_) {
+  const int around = endlessMedium(scene);
+  if (!tables_ || around != around_) {
     auto tables = std::make_unique<LampTables>(scene, options.lampTable, stop);
     if (stop.stop_requested()) return {};
-    tables_ = std::move(tables);
+    tables_ = std::move(tables), around_ = around;
   }
   return tables_->view();
 }

@@ -28,6 +28,7 @@ class FastRenderer {
   LargeArray<PixelFeatures> features_;      ///< of this scene and camera
   std::unique_ptr<Upsampling> upsampling_;  ///< likewise
   std::unique_ptr<LampTables> tables_;      ///< of this scene
+  int around_ = 0;                          ///< the medium that had no end when they were made
 };
 
 }  // namespace virga

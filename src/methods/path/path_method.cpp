@@ -26,8 +26,7 @@ class PathMethod final : public Method {
   }
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
-    // Where the camera is says which medium is around everything.
-    if (!changes.cameraAlone() || endlessMedium(*scene_) != endlessMedium(*next)) tables_.reset();
+    if (!changes.cameraAlone()) tables_.reset();
     scene_ = std::move(next);
     tableSide();
     return changes.empty() ? Reset::nothingLost : Reset::film;
@@ -43,11 +42,8 @@ class PathMethod final : public Method {
   }
 
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
-    if (!tables_) {
-      auto tables = std::make_unique<TabledLamps>(*scene_, tableSide(), stop);
-      if (stop.stop_requested()) return {.completed = false};
-      tables_ = std::move(tables);
-    }
+    prepareTables(stop);
+    if (stop.stop_requested()) return {.completed = false};
     const PathPixels pixels(*scene_, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
@@ -76,6 +72,12 @@ class PathMethod final : public Method {
     return sharedPaths_ && SharedPaths<EmbreeRays>::possible(scene_->view, optionsForScene());
   }
 
+  void prepareTables(const std::stop_token& stop) {
+    const int around = endlessMedium(*scene_);
+    if (tables_ && around == around_) return;
+    auto tables = std::make_unique<TabledLamps>(*scene_, tableSide(), stop);
+    if (!stop.stop_requested()) tables_ = std::move(tables), around_ = around;
+  }
   /// Throws where tables would be too large.
   int tableSide() const {
     const int64_t pixels = int64_t{scene_->camera.filmWidth} * scene_->camera.filmHeight;
@@ -84,6 +86,7 @@ class PathMethod final : public Method {
 
   SceneSnapshot scene_;
   std::unique_ptr<TabledLamps> tables_;  ///< of this scene, once a pass has asked for them
+  int around_ = 0;                       ///< the medium that had no end when they were made: the camera tells
   LampTableSetting lampTable_;
   bool sharedPaths_ = true;
   std::optional<int> maxDepth_, rrDepth_, equiangularDepth_;
