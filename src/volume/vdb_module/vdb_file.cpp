@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "volume/vdb_module.h"
 
-// The only file that sees OpenVDB: its headers take half a minute to compile.
+// The only file that sees OpenVDB: its templates take long to compile.
 #define NANOVDB_USE_ZIP
 #include <fmt/format.h>
 #include <nanovdb/util/IO.h>
