@@ -31,7 +31,8 @@ openvdb::math::Transform::Ptr transformOf(const SampleGrid& sample) {
 template <class GridType>
 openvdb::GridBase::Ptr filled(const SampleGrid& sample) {
   using Value = typename GridType::ValueType;
-  auto grid = GridType::create(Value(sample.background));
+  const auto grid = openvdb::gridPtrCast<GridType>(openvdb::GridBase::createGrid(GridType::gridType()));
+  grid->tree().root().setBackground(Value(sample.background), false);
   for (const Fill& fill : sample.fills)
     grid->sparseFill(openvdb::CoordBBox(openvdb::Coord(fill.lo.data()), openvdb::Coord(fill.hi.data())),
                      Value(fill.value), fill.active);

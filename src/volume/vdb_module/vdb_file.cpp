@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "volume/vdb_module.h"
 
-// The only file that sees OpenVDB: its headers take half a minute to compile.
+// The only file that sees OpenVDB: its templates take long to compile.
 #define NANOVDB_USE_ZIP
 #include <fmt/format.h>
 #include <nanovdb/util/IO.h>
@@ -13,14 +13,13 @@
 #include <openvdb/tools/Dense.h>
 #include <openvdb/util/logging.h>
 
-#include <istream>
 #include <mutex>
 #include <sstream>
-#include <streambuf>
 
 #include "core/byte_hash.h"
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
+#include "volume/vdb_module/memory_stream.h"
 #include "volume/vdb_module/vdb_walk.h"
 
 namespace virga {
@@ -37,35 +36,6 @@ void initialiseOnce() {
 }
 
 [[noreturn]] void damaged() { throw Error("file is truncated or damaged"); }
-
-class MemoryBuffer : public std::streambuf {
- public:
-  MemoryBuffer(const std::byte* bytes, size_t size) {
-    char* begin = const_cast<char*>(reinterpret_cast<const char*>(bytes));  // streambuf wants it so; nothing writes
-    setg(begin, begin, begin + size);
-  }
-
- private:
-  pos_type seekoff(off_type offset, std::ios::seekdir from, std::ios::openmode) override {
-    const off_type base = from == std::ios::beg ? 0 : from == std::ios::cur ? gptr() - eback() : egptr() - eback();
-    if (offset < -base || offset > egptr() - eback() - base) return pos_type(off_type(-1));
-    setg(eback(), eback() + base + offset, egptr());
-    return base + offset;
-  }
-  pos_type seekpos(pos_type position, std::ios::openmode which) override {
-    return seekoff(off_type(position), std::ios::beg, which);
-  }
-};
-
-// Bytes as a stream that throws where they end. OpenVDB itself does not look whether a read succeeded: on a plain
-// stream it would go on with what its variables held. (What it had allocated for a tree's topology is lost then.)
-class MemoryStream : private MemoryBuffer, public std::istream {
- public:
-  MemoryStream(const std::byte* bytes, size_t size)
-      : MemoryBuffer(bytes, size), std::istream(static_cast<MemoryBuffer*>(this)) {
-    exceptions(std::ios::failbit | std::ios::badbit);
-  }
-};
 
 struct Entry {
   std::string name, type;  // "Tree_float_5_4_3", with "_HalfFloat" where it is stored so
@@ -242,11 +212,21 @@ AlignedBytes copyOf(const nanovdb::GridHandle<>& handle) {
   return bytes;
 }
 
+// By name it is the library that makes it: constructors would instantiate all virtual functions of grid and tree here,
+// ten seconds to compile.
+openvdb::FloatGrid::Ptr emptyGrid() {
+  return openvdb::gridPtrCast<openvdb::FloatGrid>(openvdb::GridBase::createGrid(openvdb::FloatGrid::gridType()));
+}
+
 openvdb::FloatGrid::Ptr asFloat(const openvdb::GridBase::Ptr& grid) {
   if (auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return floats;
   const auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
   if (!doubles) damaged();
-  return std::make_shared<openvdb::FloatGrid>(*doubles);
+  const openvdb::FloatGrid::Ptr floats = emptyGrid();
+  floats->insertMeta(*doubles);
+  floats->setTransform(doubles->transformPtr());
+  floats->tree().root() = doubles->tree().root();
+  return floats;
 }
 
 AlignedBytes nanoTree(const openvdb::GridBase::Ptr& grid) {
@@ -292,7 +272,7 @@ void describe(VdbReader& reader, const Entry& entry, GridInfo& info) {
 
 openvdb::FloatGrid::Ptr gridOf(const DenseVolume& volume) {
   initialiseOnce();
-  auto grid = openvdb::FloatGrid::create(0.f);
+  const openvdb::FloatGrid::Ptr grid = emptyGrid();
   openvdb::math::Mat4d matrix;
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column) matrix(column, row) = volume.indexToWorld(row, column);
