@@ -123,6 +123,35 @@ TEST_F(Sequence, AFrameWithoutAChangeIsRenderedLikeAnyOther) {
   EXPECT_EQ(nlohmann::json::parse(scratch_.read("s_3.json"))["passes"], 3);
 }
 
+// The lamp must stand: kept walks are those of lamps that do.
+TEST_F(Sequence, WalksAreKeptFromFrameToFrame) {
+  std::string still = kMoving;
+  for (size_t at; (at = still.find("<animation name=\"to_world\">")) != std::string::npos;) {
+    const size_t first = still.find("<transform time=", at), inner = still.find('>', first) + 1;
+    const bool empty = still[inner - 2] == '/';
+    const size_t last = empty ? inner : still.find("</transform>", inner), end = still.find("</animation>", last) + 12;
+    still.replace(at, end - at,
+                  "<transform name=\"to_world\">" + (empty ? "" : still.substr(inner, last - inner)) + "</transform>");
+  }
+  scratch_.write("still.xml", still);
+  const auto film = [&](const char* name, const char* retrace) {
+    const Ended r = run({"render", "still.xml", "--frames", "1..3", "-m", "ims", "--set", "ims.walks=400", "--passes",
+                         "8", "--set", std::string("ims.retrace=") + retrace, "-o", std::string(name) + ".exr"});
+    EXPECT_EQ(r.exitCode, 0) << r.err;
+  };
+  film("kept", "0.25"), film("fresh", "1");
+  const auto meanOf = [](const Image& image) {
+    double sum = 0;
+    for (const Rgb& pixel : image.pixels) sum += static_cast<double>(pixel.g);
+    return sum / static_cast<double>(image.pixels.size());
+  };
+  for (int frame = 1; frame <= 3; ++frame) {
+    const Image kept = picture(fileOfFrame("kept.exr", frame)), fresh = picture(fileOfFrame("fresh.exr", frame));
+    EXPECT_NEAR(meanOf(kept) / meanOf(fresh), 1, 0.1) << frame;
+    EXPECT_NE(kept.pixels, fresh.pixels) << "other walks";
+  }
+}
+
 TEST_F(Sequence, AnErrorNamesItsFrameAndLeavesTheFramesBefore) {
   const Ended r = run({"render", "moving.xml", "--frames", "3..5", "--spp", "1", "-o", "e.exr"});
   EXPECT_EQ(r.exitCode, 1);

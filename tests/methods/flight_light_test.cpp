@@ -210,6 +210,17 @@ TEST(FlightLight, TablesFollowACameraThatLeavesASmallCloudOfItsMedium) {
   EXPECT_EQ(largestDifference(session.film().beauty(), rendered(outside, {.passes = 1}).film().beauty()), 0);
 }
 
+TEST(FlightLight, LampsWithoutPowerAreDark) {
+  const std::string dark =
+      replaced(plume(8), R"(<rgb name="intensity" value="50"/>)", R"(<rgb name="intensity" value="0"/>)");
+  EXPECT_EQ(pixelMoments(rendered(sceneOf(dark)).film().beauty()).mean(), 0);
+  const std::string both = plume(8) + point(R"(x="1" y="2" z="1")", 0);
+  const auto tables = [](const std::string& elements) {
+    return pixelMoments(rendered(sceneOf(elements), {.passes = 64}).film().beauty()).mean();
+  };
+  EXPECT_NEAR(tables(both) / tables(plume(8)), 1, 0.05) << "one that is dark beside one that is not";
+}
+
 TEST(FlightLight, TablesFollowTheLampNotTheCamera) {
   const std::string lamp = R"(<point name="position" x="-2.5" y="3" z="1.5"/>)";
   const SceneSnapshot first = sceneOf(plume(12)),

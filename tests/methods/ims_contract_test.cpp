@@ -278,12 +278,17 @@ TEST(ImsRobustness, WithoutLightThePictureIsBlack) {
     for (const SettingValues& settings :
          {SettingValues{}, {{"compensation", "sampled"}}, {{"compensation", "none"}, {"show", "lost"}}})
       EXPECT_EQ(brightness(filmOf(elements, settings)), 0) << elements;
+  // What is marched ends where next to nothing is left of the light behind.
+  for (const std::string& elements : dark)
+    for (const char* mode : {"fast", "frame"}) EXPECT_LT(brightness(filmOf(elements, {{"mode", mode}}, 2)), 1e-12);
 }
 
 TEST(ImsRobustness, WhatOnlyAbsorbsShowsTheLampsAlone) {
   const std::string black = ballOf(R"(<float name="sigma_t" value="2"/><float name="albedo" value="0"/>)");
   for (const SettingValues& settings : {SettingValues{}, {{"compensation", "sampled"}}, {{"paths", "4"}}})
     EXPECT_EQ(brightness(filmOf(kCamera + black + kPoint, settings)), 0);
+  for (const char* mode : {"fast", "frame"})
+    EXPECT_EQ(brightness(filmOf(kCamera + black + kPoint, {{"mode", mode}}, 2)), 0) << mode;
 }
 
 TEST(ImsRobustness, DepthsWithoutIndirectLight) {

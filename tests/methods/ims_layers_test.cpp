@@ -181,6 +181,25 @@ TEST(ImsLayers, LimitedDepth) {
   }
 }
 
+/// A ball of fog over a floor under lamps that have no size.
+TEST(ImsLayers, APointASpotAndTheSun) {
+  World w = world({0, 0.4, 4.5});
+  w.rectangles = {floorAt(-1.05, 3, matt(0.6, 0.5, 0.4))};
+  w.regions = {ballAt({0, 0, 0}, 1, {.sigmaT = 2, .albedo = {0.95, 0.9, 0.8}})};
+  const std::string lamps = R"(
+    <emitter type="point"><point name="position" x="-1.5" y="2" z="1"/><rgb name="intensity" value="8, 7, 6"/></emitter>
+    <emitter type="spot"><transform name="to_world"><lookat origin="2, 1.5, 1" target="0, 0, 0" up="0, 1, 0"/></transform>
+      <float name="cutoff_angle" value="25"/><rgb name="intensity" value="5, 10, 15"/></emitter>
+    <emitter type="directional"><vector name="direction" x="0.3" y="-1" z="-0.2"/><rgb name="irradiance" value="1, 1, 2"/></emitter>)";
+  expectImsIsPath(elementsOf(w) + lamps,
+                  {{Layer::directSurface, 0.01},
+                   {Layer::directMedia, 0.012},
+                   {Layer::mediaToSurface, 0.015},
+                   {Layer::surfaceToMedia, 0.015},
+                   {Layer::mediaToMedia, 0.01}},
+                  {.sets = 64}, {.radii = {0.25, 1}});
+}
+
 TEST(ImsLayers, ADepthTooManyIsNoticed) {
   World w = fogInRoom();
   w.maxDepth = 4;

@@ -64,7 +64,11 @@ std::string panel(double radiance) {
 
 TEST(Robustness, LightsWithoutPowerAreDark) {
   const std::string scene = kFromAfar + ball("2", "0.9");
-  for (const std::string& lights : {lamp(0), panel(0), lamp(0) + panel(0)})
+  const auto dark = [&](const char* type, const char* power) {
+    return fmt::format(R"(<emitter type="{}"><rgb name="{}" value="0"/></emitter>)", type, power);
+  };
+  for (const std::string& lights : {lamp(0), panel(0), lamp(0) + panel(0), dark("spot", "intensity"),
+                                    dark("directional", "irradiance"), dark("constant", "radiance")})
     EXPECT_EQ(pixelMoments(pictureOf(scene + lights)).mean(), 0) << lights;
 }
 

@@ -206,11 +206,25 @@ void requireLinear(const std::string& name, const openvdb::GridBase& grid) {
     throw Error(fmt::format("grid \"{}\" has a perspective (frustum) transform; only affine ones are known", name));
 }
 
-AlignedBytes copyOf(const nanovdb::GridHandle<>& handle) {
-  AlignedBytes bytes(handle.size());
-  std::memcpy(bytes.data(), handle.data(), handle.size());
-  return bytes;
-}
+/// A buffer for NanoVDB whose bytes can be taken out.
+class TakenBuffer {
+ public:
+  TakenBuffer() = default;
+  static TakenBuffer create(uint64_t size, const TakenBuffer* = nullptr) {
+    TakenBuffer buffer;
+    buffer.bytes_ = AlignedBytes(size);
+    return buffer;
+  }
+  uint8_t* data() { return reinterpret_cast<uint8_t*>(bytes_.data()); }
+  const uint8_t* data() const { return reinterpret_cast<const uint8_t*>(bytes_.data()); }
+  uint64_t size() const { return bytes_.size(); }
+  bool empty() const { return bytes_.size() == 0; }
+  void clear() { bytes_ = {}; }
+  AlignedBytes take() { return std::move(bytes_); }
+
+ private:
+  AlignedBytes bytes_;
+};
 
 // By name it is the library that makes it: constructors would instantiate all virtual functions of grid and tree here,
 // ten seconds to compile.
@@ -230,7 +244,9 @@ openvdb::FloatGrid::Ptr asFloat(const openvdb::GridBase::Ptr& grid) {
 }
 
 AlignedBytes nanoTree(const openvdb::GridBase::Ptr& grid) {
-  return copyOf(nanovdb::openToNanoVDB(*asFloat(grid), nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable));
+  auto handle =
+      nanovdb::openToNanoVDB<TakenBuffer>(*asFloat(grid), nanovdb::StatsMode::Disable, nanovdb::ChecksumMode::Disable);
+  return handle.buffer().take();
 }
 
 // OpenVDB reports ends of file as failures of the stream.
