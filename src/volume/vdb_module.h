@@ -13,9 +13,9 @@ namespace virga {
 
 /// What needs OpenVDB, which takes longer to load than `virga --help` may run: it lies in a module of its own.
 struct VdbModule {
-  std::shared_ptr<const Grid> (*load)(const AlignedBytes& bytes, const VolumeRequest& request,
-                                      const GridOptions& options);
-  std::vector<GridInfo> (*info)(const AlignedBytes& bytes);
+  /// `bytes` of a file are freed as soon as they are read.
+  std::shared_ptr<const Grid> (*load)(AlignedBytes bytes, const VolumeRequest& request, const GridOptions& options);
+  std::vector<GridInfo> (*info)(AlignedBytes bytes);     ///< likewise
   std::string (*encodeVdb)(const DenseVolume& volume);   ///< a whole `.vdb` file
   std::string (*encodeNvdb)(const DenseVolume& volume);  ///< a whole `.nvdb` file
   /// Expands one Blosc buffer to exactly `size` bytes; false where it is damaged. Here because OpenVDB brings Blosc

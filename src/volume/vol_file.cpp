@@ -140,10 +140,10 @@ RgbGrid loadRgbVol(const AlignedBytes& bytes) {
 
 GridInfo volInfo(const AlignedBytes& bytes) {
   const VolFile file = parseVol(bytes);
-  const std::vector<float> values = floatsOf(file);
   GridInfo info;
   info.kind = "fog volume", info.valueType = "float", info.format = "vol 3";
   info.problem = problemOf(bytes);
+  const std::vector<float> values = floatsOf(file);  // not while a grid has its own of them
   info.activeVoxels = file.voxels();
   info.indexHi = {file.nx - 1, file.ny - 1, file.nz - 1};
   info.worldBounds = file.bounds;

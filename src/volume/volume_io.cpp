@@ -63,9 +63,9 @@ VolumeFormat volumeFormat(const std::filesystem::path& path) {
 
 std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const VolumeRequest& request,
                                        const GridOptions& options) {
-  return withFile(path, [&](const AlignedBytes& bytes) {
+  return withFile(path, [&](AlignedBytes bytes) {
     if (isVol(bytes)) return loadVol(bytes, request, options);
-    if (isVdb(bytes)) return vdbModule().load(bytes, request, options);
+    if (isVdb(bytes)) return vdbModule().load(std::move(bytes), request, options);
     if (isNvdb(bytes)) return loadNvdb(bytes, request, options);
     refuseFormat();
   });
@@ -93,9 +93,9 @@ Bounds volBounds(const std::filesystem::path& path) {
 }
 
 std::vector<GridInfo> listGrids(const std::filesystem::path& path) {
-  return withFile(path, [&](const AlignedBytes& bytes) {
+  return withFile(path, [&](AlignedBytes bytes) {
     if (isVol(bytes)) return std::vector<GridInfo>{volInfo(bytes)};
-    if (isVdb(bytes)) return vdbModule().info(bytes);
+    if (isVdb(bytes)) return vdbModule().info(std::move(bytes));
     if (isNvdb(bytes)) return nvdbInfo(bytes);
     refuseFormat();
   });

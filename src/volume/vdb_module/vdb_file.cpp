@@ -13,6 +13,9 @@
 #include <openvdb/tools/Dense.h>
 #include <openvdb/util/logging.h>
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <mutex>
 #include <sstream>
 
@@ -272,10 +275,13 @@ nanovdb::GridClass kindOf(const openvdb::GridBase& grid) {
   }
 }
 
-void describe(VdbReader& reader, const Entry& entry, GridInfo& info) {
+/// `read` is called once nothing more is needed of the file.
+template <class Read>
+void describe(VdbReader& reader, const Entry& entry, GridInfo& info, const Read& read) {
   try {
     requireScalar(info.name, entry);
     const openvdb::GridBase::Ptr grid = reader.read(entry);
+    read();
     requireLinear(info.name, *grid);
     AlignedBytes tree = nanoTree(grid);
     describeTree(*reinterpret_cast<nanovdb::FloatGrid*>(tree.data()), tree.size(), info);
@@ -309,23 +315,33 @@ class VdbWriter : private openvdb::io::Archive {
   }
 };
 
-std::shared_ptr<const Grid> loadVdb(const AlignedBytes& bytes, const VolumeRequest& request,
-                                    const GridOptions& options) {
-  AlignedBytes tree = guarded([&] {
+// OpenVDB's nodes are many small blocks, which the C library keeps for later when they are freed.
+void returnFreedMemory() {
+#ifdef __GLIBC__
+  malloc_trim(0);
+#endif
+}
+
+std::shared_ptr<const Grid> loadVdb(AlignedBytes bytes, const VolumeRequest& request, const GridOptions& options) {
+  openvdb::GridBase::Ptr grid = guarded([&] {
     VdbReader reader(bytes);
     const std::vector<std::string> names = namesOf(reader.entries());
     const size_t chosen = chooseGrid(names, request);
     requireScalar(names[chosen], reader.entries()[chosen]);
-    const openvdb::GridBase::Ptr grid = reader.read(reader.entries()[chosen]);
-    requireFog(names[chosen], kindOf(*grid));
-    requireLinear(names[chosen], *grid);
-    return nanoTree(grid);
+    openvdb::GridBase::Ptr read = reader.read(reader.entries()[chosen]);
+    requireFog(names[chosen], kindOf(*read));
+    requireLinear(names[chosen], *read);
+    return read;
   });
+  bytes = {};
+  AlignedBytes tree = nanoTree(grid);
+  grid.reset();
+  returnFreedMemory();
   return GridFactory::tree(std::move(tree), options);
 }
 
-std::vector<GridInfo> vdbInfo(const AlignedBytes& bytes) {
-  return guarded([&] {
+std::vector<GridInfo> vdbInfo(AlignedBytes bytes) {
+  std::vector<GridInfo> infos = guarded([&] {
     VdbReader reader(bytes);
     const std::vector<std::string> names = namesOf(reader.entries());
     std::vector<GridInfo> list;
@@ -335,10 +351,14 @@ std::vector<GridInfo> vdbInfo(const AlignedBytes& bytes) {
       info.kind = "unknown";
       info.valueType = valueType(reader.entries()[i]);
       info.format = fmt::format("vdb {}", reader.version());
-      describe(reader, reader.entries()[i], info);
+      describe(reader, reader.entries()[i], info, [&] {
+        if (i + 1 == names.size()) bytes = {};
+      });
     }
     return list;
   });
+  returnFreedMemory();
+  return infos;
 }
 
 bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* out, size_t size) try {
