@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "methods/ims_scenes.h"
 #include "methods/rendering.h"
 
 namespace virga {
@@ -40,6 +41,13 @@ void expectWhite(const std::string& elements) {
 
 TEST(Furnace, EmptySceneIsWhite) { expectWhite(""); }
 TEST(Furnace, MediumIsWhite) { expectWhite(cloud("1")); }
+TEST(Furnace, SmokeOnAGridIsWhite) {
+  const std::string scene = plume(8), albedo = R"(<rgb name="albedo" value="0.9"/>)";
+  std::string smoke =
+      scene.substr(scene.find(R"(<shape type="cube"><transform name="to_world"><scale value="0.95"/>)"));
+  smoke.replace(smoke.find(albedo), albedo.size(), R"(<rgb name="albedo" value="1"/>)");
+  expectWhite(smoke);
+}
 TEST(Furnace, BackwardMediumIsWhite) { expectWhite(cloud("1", "-0.8")); }
 TEST(Furnace, CornetteShanksIsWhite) {
   expectWhite(cloudOf(R"(<phase type="cornette_shanks"><float name="g" value="0.5"/></phase>)"));

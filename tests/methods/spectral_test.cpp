@@ -142,6 +142,23 @@ TEST(Spectral, MediaThatOverlap) {
            box(homogeneous({0.5, 0.1, 2}, c), "<scale value=\"0.8\"/><translate x=\"0.5\"/>");
   });
 }
+// All flights are spectral where some medium has colour, if only a speck far away.
+TEST(Spectral, GreyMediaAreTheSameBesideColour) {
+  const std::string speck = box(homogeneous({1, 2, 4}, -1), R"(<scale value="0.01"/><translate x="40"/>)");
+  const auto means = [&](const char* sigmaT, const std::string& besides, uint64_t seed) {
+    const std::string grey =
+        fmt::format(R"(<medium name="interior" type="homogeneous"><float name="sigma_t" value="{}"/>
+      <rgb name="albedo" value="0.95, 0.8, 0.9"/></medium>)",
+                    sigmaT);
+    const SceneSnapshot scene = sceneOf(std::string(kCamera) + kLamp + kGround + box(grey) + besides);
+    EXPECT_EQ(scene->view.chromatic, !besides.empty());
+    return replicateMoments(rendered(scene, {.passes = 512, .seed = seed}).film());
+  };
+  const stats::Moments alone = means("1.5", "", 1);
+  EXPECT_GT(stats::welchTest(means("1.5", speck, 2), alone), 1e-3);
+  EXPECT_LT(stats::welchTest(means("1.8", speck, 2), alone), 1e-3) << "denser media must be seen";
+}
+
 TEST(Spectral, TheTestNoticesFivePercent) {
   double precision = 0;
   const auto wrong = [](int c) {
