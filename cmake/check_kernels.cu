@@ -30,6 +30,23 @@ __global__ void tracePaths(SceneView scene, StubRays rays, PathOptions options, 
   out[pixel] = tracer.trace(camera.ray(offset.x, offset.y), sampler).sum();
 }
 
+__global__ void marchEyes(SceneView scene, StubRays rays, View<LampTable> tables, PerspectiveCamera camera, Rgb* out) {
+  Sampler sampler(SampleId{1, 2, threadIdx.x, 3});
+  MarchedEye eye;
+  marchEye(scene, rays, camera.ray(0.5f, 0.5f), 0.f, eye);
+  RandomNumbers numbers{sampler};
+  LayerRadiance radiance;
+  MarchedLight<StubRays>(scene, rays, tables).add(eye, radiance, numbers);
+  out[threadIdx.x] = radiance.sum();
+}
+
+__global__ void walkFromLights(SceneView scene, StubRays rays, MediaRay start, Rgb* out) {
+  Sampler sampler(SampleId{1, 2, threadIdx.x, 3});
+  LightWalker<StubRays>(scene, rays, 8).walk(start, Rgb(1.f), sampler, [&](const LightVertex& v, const SurfaceScattering*) {
+    out[threadIdx.x] += v.weight;
+  });
+}
+
 __global__ void lookUp(GridView grid, RgbGridView colors, PhaseFunction phase, const Vec3* at, float* out) {
   const Vec3 p = at[threadIdx.x];
   const PhaseSample s = phase.sample(p, {p.x, p.y});

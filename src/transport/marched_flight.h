@@ -44,7 +44,7 @@ class FlightMarch {
       if (pass(a + i * step, a + (i + 1) * step, extinction(a + (i + 0.5f) * step))) return true;
     return false;
   }
-  const GridRay& ray() const { return g_; }
+  VIRGA_HD const GridRay& ray() const { return g_; }
   VIRGA_HD float t() const { return t_; }          ///< infinite where no flight has ended
   VIRGA_HD Rgb passed() const { return passed_; }  ///< optical depth, in every channel
   VIRGA_HD Rgb extinctionAtEnd() const { return at_; }

@@ -61,7 +61,7 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
     const int to = std::min(steps, static_cast<int>((filled.t1 - begin) / step + shift + 0.01f));
     float density[kMarchedAtOnce];
     for (int n0 = from; n0 <= to; n0 += kMarchedAtOnce) {
-      const int count = std::min(kMarchedAtOnce, to + 1 - n0);
+      const int left = to + 1 - n0, count = left < kMarchedAtOnce ? left : kMarchedAtOnce;
       // The first step and the last may be cut: their middles are off by less than half a step.
       const GridRay inGrid(first, {ray.at(begin + step * (static_cast<float>(n0) + 0.5f - shift)), ray.d * step});
       lookupAlong(first.density, inGrid.o, inGrid.d, count, density);
