@@ -221,6 +221,15 @@ after so many passes counts, not k.
 
 The scenes: `smoke`, a plume of 128^3 voxels over a ground, albedo 0.95, under a point light; `smoke-g0.6`, the same with forward scattering; `fog`, a
 closed box of thin fog with a lamp, the camera inside. They are not part of the repository.
+
+The least k of other path tracers on these scenes, measured once on two cores of another machine, and what `path` is meant to stay below:
+
+| | smoke | smoke-g0.6 | fog |
+| --- | --- | --- | --- |
+| pbrt-v4, `volpath` | 0.137 | 0.292 | 10.1 |
+| Tungsten | 0.106 | 0.209 | 1.75 |
+| Blender Cycles 3.4 | 0.106 | 0.303 | 1.56 |
+| aim | 0.05 | 0.10 | 0.40 |
 """
 
 

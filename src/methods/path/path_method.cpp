@@ -44,7 +44,8 @@ class PathMethod final : public Method {
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     prepareTables(stop);
     if (stop.stop_requested()) return {.completed = false};
-    const PathPixels pixels(*scene_, optionsForScene());
+    const EmbreeRays rays{*scene_->surfaceRays, *scene_->boundaryRays};
+    const PathPixels pixels(*scene_, rays, optionsForScene());
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const SampleId id{seed_, replicate, 0, sample};

@@ -9,11 +9,12 @@ namespace virga {
 
 /// Samples of pixels by path tracing: of single ones, each on its own, or of groups that share paths. The scene must
 /// outlive it.
+template <class Rays>
 class PathPixels {
  public:
-  PathPixels(const Scene& scene, const PathOptions& options)
+  PathPixels(const Scene& scene, const Rays& rays, const PathOptions& options)
       : scene_(scene),
-        rays_{*scene.surfaceRays, *scene.boundaryRays},
+        rays_(rays),
         options_(options),
         tracer_(scene_.view, rays_, options_),
         shared_(scene_.view, rays_, tracer_) {}
@@ -45,13 +46,13 @@ class PathPixels {
   }
 
  private:
-  static_assert(PixelGroups::kMostPixels <= SharedPaths<EmbreeRays>::kMost);
+  static_assert(PixelGroups::kMostPixels <= SharedPaths<Rays>::kMost);
 
   const Scene& scene_;
-  EmbreeRays rays_;
+  Rays rays_;
   PathOptions options_;
-  PathTracer<EmbreeRays> tracer_;   ///< refers to the members above
-  SharedPaths<EmbreeRays> shared_;  ///< likewise
+  PathTracer<Rays> tracer_;   ///< refers to the members above
+  SharedPaths<Rays> shared_;  ///< likewise
 };
 
 }  // namespace virga
