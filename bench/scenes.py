@@ -53,7 +53,8 @@ def parse_arguments():
                         help="relMSE to render references to (default: the scene's row; coarser is quicker and less exact)")
     parser.add_argument("--page", metavar="FILE.md", help="also write the table as a page, as docs/results/speed.md is made")
     parser.add_argument("--mitsuba", nargs="?", const="scalar_rgb", metavar="VARIANTS",
-                        help="also run Mitsuba 3 (pip install mitsuba) on the same files; variants, comma separated")
+                        help="also run Mitsuba 3 (pip install mitsuba) on the same files; variants, comma separated. Those of llvm need "
+                        "LLVM 17 or newer, which $DRJIT_LIBLLVM_PATH names")
     options = parser.parse_args()
     options.method = options.method or ["path"]
     if not options.scenes:

@@ -21,10 +21,13 @@ TASKS = [
     ("tentative collisions", r"transport/tracking\.h"),
     ("crossings and media", r"[cC]rossing|media_walk\.h|MediaState"),
     ("ray queries", r"ray_scene|embree|RayScene"),
+    ("equiangular connections", r"equiangular\.h|atanf?\b|atan2f"),
+    ("guides toward lamps", r"lamp_guide\.h"),
+    ("sharing between pixels", r"shared_paths\.h|pixel_groups\.h|path_pixels\.h"),
     ("film", r"Film|PassFrame|/image/"),
     ("phase functions and bsdfs", r"/scattering/|warp\.h|sincosf|powf|expf"),
     ("camera, lights, surface points", r"camera\.h|emitter\.h|shape\.h|spherical_rectangle"),
-    ("vertices and connections", r"methods/path/"),
+    ("vertices and connections", r"methods/path/|transport/(vertex|visibility)\.h"),
 ]
 
 
