@@ -199,6 +199,7 @@ void buildCylinder(BuildContext&, PluginReader& reader, Role, BuiltShape& shape)
   view.length = length;
   shape.rays = RayShape::cylinder(view.center, view.normal, radius, length);
   shape.view.area = kTwoPi * radius * length;
+  shape.openEdges = 2;
   for (const Vec3 end : {view.center, view.center + view.normal * length}) {
     shape.bounds.extend(end - Vec3(radius));
     shape.bounds.extend(end + Vec3(radius));
@@ -290,15 +291,6 @@ void addBoundary(BuildContext& context, MediumTransition media, std::shared_ptr<
   context.parts.boundaryShapes.push_back(std::move(shape));
 }
 
-void warnOfOpenEnds(BuildContext& context, PluginReader& reader, const MediumTransition& media) {
-  if (media.interior == MediumTransition::kNone && media.exterior == MediumTransition::kNone) return;
-  const std::string where = reader.node().hasGeneratedId() ? "" : fmt::format(" \"{}\"", reader.node().id);
-  context.diagnostics.warnings.push_back(
-      fmt::format("warning: the cylinder{} is open at its ends: light that passes them does not cross the boundary of "
-                  "its medium; close it with a mesh",
-                  where));
-}
-
 }  // namespace
 
 void buildShape(BuildContext& context, const Node& node) {
@@ -311,7 +303,6 @@ void buildShape(BuildContext& context, const Node& node) {
   MediumTransition media = mediaOf(context, reader);
   warnIfOpen(reader, media, *shape);
   reader.finish();
-  if (shape->view.kind == ShapeView::Kind::cylinder) warnOfOpenEnds(context, reader, media);
   if (bsdf) buildBsdf(context, *bsdf);
   if (null) return addBoundary(context, media, std::move(shape));
 

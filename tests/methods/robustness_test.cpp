@@ -49,6 +49,45 @@ stats::Moments means(const std::string& elements, int passes = 64, uint64_t seed
   return replicateMoments(session.film());
 }
 
+// --- boundaries of several shapes ---
+
+/// Black fog in a tube with a disk at either end, as wide as it is high.
+std::string closedTube(const std::string& media) {
+  const std::string bounds = "<bsdf type=\"null\"/>" + media;
+  std::string elements =
+      "<shape type=\"cylinder\"><point name=\"p0\" x=\"0\" y=\"-1\" z=\"0\"/>"
+      "<point name=\"p1\" x=\"0\" y=\"1\" z=\"0\"/>" +
+      bounds + "</shape>";
+  for (const int end : {1, -1})
+    elements += fmt::format(R"(<shape type="disk"><transform name="to_world"><rotate x="1" angle="{}"/>
+      <translate y="{}"/></transform>{}</shape>)",
+                            -90 * end, end, bounds);
+  return elements;
+}
+
+TEST(Boundaries, ATubeIsClosedByDisks) {
+  const std::string black = R"(<float name="sigma_t" value="1"/><float name="albedo" value="0"/></medium>)";
+  const std::string interior = R"(<medium type="homogeneous" name="interior">)" + black;
+  const std::string exterior =
+      R"(<medium type="homogeneous" name="exterior"><float name="sigma_t" value="0"/></medium>)";
+  const auto ray = [](const std::string& origin, const std::string& target, const std::string& medium = "") {
+    return fmt::format(R"(<sensor type="perspective"><float name="fov" value="0.001"/>
+      <transform name="to_world"><lookat origin="{}" target="{}" up="0, 0, 1"/></transform>
+      <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="24"/></film>{}</sensor>)",
+                       origin, target, medium);
+  };
+  const std::string fog = "<medium type=\"homogeneous\">" + black;
+  for (const std::string& media : {interior, interior + exterior}) {
+    const std::string tube = kSky + closedTube(media);
+    // By the side, by the side and an end, by an end and the side, from within, and past it all.
+    EXPECT_NEAR(means(tube + ray("2, -1.5, 0", "0, 0, 0")).mean(), std::exp(-2.5f), 0.008);
+    EXPECT_NEAR(means(tube + ray("2, -1, 0", "0, 1, 0")).mean(), std::exp(-std::sqrt(2.f)), 0.008);
+    EXPECT_NEAR(means(tube + ray("-0.5, 2, 0", "1, 0.5, 0")).mean(), std::exp(-std::sqrt(0.5f)), 0.008);
+    EXPECT_NEAR(means(tube + ray("0, 0, 0", "0, 1, 0", fog)).mean(), std::exp(-1.f), 0.008);
+    EXPECT_NEAR(means(tube + ray("2, 0, 0", "2, 1, 0.1")).mean(), 1, 1e-6);
+  }
+}
+
 // --- lights ---
 
 std::string lamp(double intensity) {
