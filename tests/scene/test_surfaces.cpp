@@ -223,7 +223,7 @@ LitIntegrals fromLightSamples(const Scene& scene, Vec3 x) {
   const EmitterView& emitter = scene.view.emitters[0];
   LitIntegrals found;
   Pcg32 rng(11);
-  for (int i = 0; i < 400'000; ++i) {
+  for (int i = 0; i < 200'000; ++i) {
     const LightSample s = sampleLight(scene.view, emitter, x, {rng.next(), rng.next()});
     const bool seen = s.pdf > 0 && !scene.surfaceRays->occluded({x, s.wi}, 0, s.distance * 0.999f);
     found.add(seen ? 1 / static_cast<double>(s.pdf) : 0, s.wi);
@@ -239,7 +239,7 @@ LitIntegrals fromDirections(const Scene& scene, Vec3 x) {
   constexpr float kHeight = 0.5f;
   LitIntegrals found;
   Pcg32 rng(12);
-  for (int i = 0; i < 400'000; ++i) {
+  for (int i = 0; i < 200'000; ++i) {
     const Vec3 w = toTube.toWorld(uniformCone({rng.next(), rng.next()}, kHeight));
     found.add(litPoint(scene, x, w) ? static_cast<double>(kTwoPi * kHeight) : 0, w);
   }
