@@ -94,7 +94,7 @@ def run_mitsuba(scene, size, options, integrator="volpathmis"):
     """Replicates of Mitsuba 3: the variance of their mean."""
     target = OUT / f"{scene.stem}-mitsuba.npy"
     spp = max(1, options.mitsuba_spp // REPLICATES)
-    command = [sys.executable, ROOT / "bench/peer_mitsuba.py", scene, target, "scalar_rgb", spp, REPLICATES,
+    command = [sys.executable, ROOT / "bench/peer_mitsuba.py", scene, target, "scalar_rgb", spp, REPLICATES, 1,
                f"res={size[0]}", f"integrator={integrator}"]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode != 0:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renders the scenes of bench/peers with Mitsuba 3 and with Virga, from the same files, and tells whether the pictures agree.
 
-Both renderers make independent replicates (seeds 1, 2, ...). Of each scene:
+Both renderers make independent replicates (seeds 1, 2, ..., or from --first-seed on). Of each scene:
   bias     (V - M) / M of the pictures' means, with its standard error from the replicates: what the comparison can tell
   p        of Welch's t-test that both have the same mean; smallest of the three channels, Sidak-corrected
   p blocks the same of 4 x 4 blocks of the picture: differences that cancel in the mean
@@ -40,6 +40,7 @@ def parse_arguments():
     parser.add_argument("--only", action="append", metavar="NAME", help="this scene alone; repeatable")
     parser.add_argument("--replicates", type=int, default=8, metavar="N", help="independent pictures of each renderer (default 8)")
     parser.add_argument("--spp", type=int, default=256, metavar="N", help="samples a pixel of each of them (default 256)")
+    parser.add_argument("--first-seed", type=int, default=1, metavar="N", help="of the replicates' seeds (default 1)")
     parser.add_argument("--variant", default="scalar_rgb", help="Mitsuba's variant (default scalar_rgb)")
     parser.add_argument("--virga", type=pathlib.Path, default=ROOT / "build/release/virga", help="the program to test")
     parser.add_argument("--document", action="store_true", help="write docs/results/peers.md")
@@ -62,7 +63,8 @@ def prepare():
 def run_mitsuba(scene, options):
     """Replicates in a process of its own: a renderer that aborts is a row of the table."""
     target = OUT / f"{scene.stem}-mitsuba.npy"
-    command = [sys.executable, ROOT / "bench/peer_mitsuba.py", scene, target, options.variant, options.spp, options.replicates]
+    command = [sys.executable, ROOT / "bench/peer_mitsuba.py", scene, target, options.variant, options.spp, options.replicates,
+               options.first_seed]
     done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
     if done.returncode != 0:
         lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
@@ -83,7 +85,7 @@ def thicker(scene):
 def run_virga(scene, options):
     pictures, seconds = [], 0
     file = thicker(scene) if options.control else scene
-    for seed in range(1, options.replicates + 1):
+    for seed in range(options.first_seed, options.first_seed + options.replicates):
         picture = OUT / f"{scene.stem}-virga.exr"
         command = [options.virga, "render", file, "--spp", options.spp, "--seed", seed, "-o", picture, "--quiet"]
         start = time.monotonic()

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "core/large_array.h"
 #include "loaders/bare_volume.h"
 #include "loaders/mitsuba_xml.h"
 #include "volume/volume_io.h"
@@ -55,6 +56,7 @@ SceneDescription sceneAroundVolume(const std::vector<std::string>& frames, doubl
     all.maximumDensity = std::max(all.maximumDensity, density.maximum);
     all.meanDensity += (isVol ? meanOfNonZero(file) : density.mean) / static_cast<float>(frames.size());
   }
+  returnFreedMemory();  // the scene is to load them again
   return describeBareVolume(all);
 }
 

@@ -2,6 +2,9 @@
 #include "core/large_array.h"
 
 #include <new>
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 #if defined(__linux__)
 #include <sys/mman.h>
 #endif
@@ -22,5 +25,11 @@ void* allocateLarge(size_t bytes) {
 }
 
 void freeLarge(void* memory) { ::operator delete(memory, kPage); }
+
+void returnFreedMemory() {
+#if defined(__GLIBC__)
+  ::malloc_trim(0);
+#endif
+}
 
 }  // namespace virga

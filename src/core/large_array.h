@@ -12,6 +12,10 @@ namespace virga {
 void* allocateLarge(size_t bytes);
 void freeLarge(void* memory);
 
+/// Gives the system back what has been freed. The C library keeps small blocks for later, and large ones up to the
+/// largest that it has seen freed (glibc: 32 MiB at most).
+void returnFreedMemory();
+
 /// Room for many plain values, which are written before they are read: nothing is cleared.
 template <class T>
 class LargeArray {

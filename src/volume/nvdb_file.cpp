@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/large_array.h"
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
 #include "volume/vdb_module.h"
@@ -229,6 +230,15 @@ AlignedBytes validTree(const Entry& entry) {
   return bytes;
 }
 
+AlignedBytes chosenTree(const AlignedBytes& bytes, const VolumeRequest& request) {
+  const std::vector<Entry> entries = parse(bytes);
+  const std::vector<std::string> names = namesOf(entries);
+  const size_t chosen = chooseGrid(names, request);
+  AlignedBytes tree = validTree(entries[chosen]);
+  requireFog(names[chosen], reinterpret_cast<const nanovdb::FloatGrid*>(tree.data())->gridClass());
+  return tree;
+}
+
 }  // namespace
 
 bool isNvdb(const AlignedBytes& bytes) {
@@ -237,13 +247,10 @@ bool isNvdb(const AlignedBytes& bytes) {
   return magic == kMagic || magic == kGridMagic || magic == kFileMagic;
 }
 
-std::shared_ptr<const Grid> loadNvdb(const AlignedBytes& bytes, const VolumeRequest& request,
-                                     const GridOptions& options) {
-  const std::vector<Entry> entries = parse(bytes);
-  const std::vector<std::string> names = namesOf(entries);
-  const size_t chosen = chooseGrid(names, request);
-  AlignedBytes tree = validTree(entries[chosen]);
-  requireFog(names[chosen], reinterpret_cast<const nanovdb::FloatGrid*>(tree.data())->gridClass());
+std::shared_ptr<const Grid> loadNvdb(AlignedBytes bytes, const VolumeRequest& request, const GridOptions& options) {
+  AlignedBytes tree = chosenTree(bytes, request);
+  bytes = {};  // not while a dense grid is made of the tree
+  returnFreedMemory();
   return GridFactory::tree(std::move(tree), options);
 }
 

@@ -7,8 +7,7 @@
 namespace virga {
 
 bool isNvdb(const AlignedBytes& bytes);
-std::shared_ptr<const Grid> loadNvdb(const AlignedBytes& bytes, const VolumeRequest& request,
-                                     const GridOptions& options);
+std::shared_ptr<const Grid> loadNvdb(AlignedBytes bytes, const VolumeRequest& request, const GridOptions& options);
 std::vector<GridInfo> nvdbInfo(const AlignedBytes& bytes);
 
 }  // namespace virga

@@ -131,10 +131,13 @@ RgbGrid loadRgbVol(const AlignedBytes& bytes) {
   const VolFile file = parseVol(bytes);
   if (file.channels != 1 && file.channels != 3)
     throw Error(fmt::format("has {} channels where 3 or 1 are wanted", file.channels));
-  const std::vector<float> values = floatsOf(file);
   std::vector<Rgb> colours(file.voxels());
-  for (size_t i = 0; i < colours.size(); ++i)
-    colours[i] = file.channels == 1 ? Rgb(values[i]) : Rgb(values[3 * i], values[3 * i + 1], values[3 * i + 2]);
+  if (file.channels == 3) {
+    std::memcpy(colours.data(), file.values, colours.size() * sizeof(Rgb));  // no third copy of what may be large
+  } else {
+    const std::vector<float> values = floatsOf(file);
+    std::transform(values.begin(), values.end(), colours.begin(), [](float value) { return Rgb(value); });
+  }
   return RgbGrid(file.nx, file.ny, file.nz, std::move(colours));
 }
 

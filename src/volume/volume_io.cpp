@@ -9,6 +9,7 @@
 
 #include "core/atomic_write.h"
 #include "core/extension.h"
+#include "core/large_array.h"
 #include "volume/file_bytes.h"
 #include "volume/nvdb_file.h"
 #include "volume/vdb_module.h"
@@ -22,7 +23,9 @@ namespace {
 template <class Body>
 auto withFile(const std::filesystem::path& path, const Body& body) {
   try {
-    return body(readFile(path));
+    auto result = body(readFile(path));
+    returnFreedMemory();  // the file, and what it took to read it
+    return result;
   } catch (const Error& e) {
     if (e.details().position.known()) throw;
     throw e.at(inFile(path));
@@ -66,7 +69,7 @@ std::shared_ptr<const Grid> loadVolume(const std::filesystem::path& path, const 
   return withFile(path, [&](AlignedBytes bytes) {
     if (isVol(bytes)) return loadVol(bytes, request, options);
     if (isVdb(bytes)) return vdbModule().load(std::move(bytes), request, options);
-    if (isNvdb(bytes)) return loadNvdb(bytes, request, options);
+    if (isNvdb(bytes)) return loadNvdb(std::move(bytes), request, options);
     refuseFormat();
   });
 }

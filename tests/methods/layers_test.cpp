@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "methods/layers_checks.h"
+#include "transport/tabled_lamps.h"
 
 namespace virga {
 namespace {
@@ -227,20 +228,22 @@ TEST(Layers, ColouredCloud) {
 
 // --- lights that nothing meets by chance, as small lights that something does ---
 
+std::string pointAt(const std::string& place) {
+  return R"(<emitter type="point"><point name="position" )" + place + R"(<rgb name="intensity" value="5"/></emitter>)";
+}
+std::string smallSphereAt(const std::string& place) {
+  const double radius = 0.005;  // a larger one keeps fog from where the point's light is brightest
+  return fmt::format(R"(<shape type="sphere"><point name="center" {}<float name="radius" value="{}"/>
+    <emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>)",
+                     place, radius, 5 / (M_PI * radius * radius));
+}
+
 // Outside of the picture: near a light in fog pixels vary without bound.
 TEST(Layers, PointLightIsASmallSphere) {
   World world = glossyInFog();
   world.spheres.erase(world.spheres.begin());
   const std::string elements = elementsOf(world), place = R"(x="-0.3" y="1.3" z="1.4"/>)";
-  const double radius = 0.02;
-  const Picture sphere = pictureByPath(
-      elements + fmt::format(R"(<shape type="sphere"><point name="center" {}<float name="radius" value="{}"/>
-    <emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>)",
-                             place, radius, 5 / (M_PI * radius * radius)));
-  const Picture point = pictureByPath(elements + R"(<emitter type="point"><point name="position" )" + place +
-                                          R"(<rgb name="intensity" value="5"/></emitter>)",
-                                      2);
-  expectAgreement(point, sphere,
+  expectAgreement(pictureByPath(elements + pointAt(place), 2), pictureByPath(elements + smallSphereAt(place)),
                   {{Layer::directSurface, 0.01},
                    {Layer::directMedia, 0.01},
                    {Layer::surfaceToSurface, 0.03},
@@ -248,6 +251,29 @@ TEST(Layers, PointLightIsASmallSphere) {
                    {Layer::surfaceToMedia, 0.035},
                    {Layer::mediaToMedia, 0.02}},
                   Compare::notEmission);
+}
+
+// The point's light is looked up in a table of optical depths and gathered along flights, the sphere's is sampled.
+TEST(Layers, PointLightIsASmallSphereInSmoke) {
+  World world = smokeInRoom();
+  world.rectangles.erase(world.rectangles.begin() + 1);
+  const std::string elements = elementsOf(world), place = R"(x="-1.1" y="1.4" z="1"/>)";
+  const SceneSnapshot scene = sceneOf(elements + pointAt(place), ::testing::TempDir());
+  const TabledLamps lamps(*scene, tabledLampSide(scene->view, world.size * world.size), {});
+  ASSERT_TRUE(lamps.view().size > 0 && lamps.view()[0].present());
+  const Picture truth = pictureByPath(elements + smallSphereAt(place));
+  expectAgreement(pictureByPath(elements + pointAt(place), 2), truth,
+                  {{Layer::directSurface, 0.01},
+                   {Layer::directMedia, 0.01},
+                   {Layer::surfaceToSurface, 0.02},
+                   {Layer::mediaToSurface, 0.02},
+                   {Layer::surfaceToMedia, 0.02},
+                   {Layer::mediaToMedia, 0.02}},
+                  Compare::notEmission);
+  world.regions[0].medium.sigmaT *= 1.15;
+  const Picture denser = pictureByPath(elementsOf(world) + pointAt(place), 3);
+  for (const Layer layer : {Layer::directSurface, Layer::mediaToMedia})
+    EXPECT_LT(compared(denser, truth, layer).p, kSuspicious) << "the test cannot fail";
 }
 
 TEST(Layers, DirectionalLightIsAFarSphere) {

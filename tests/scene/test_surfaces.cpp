@@ -171,64 +171,92 @@ TEST(Cylinder, IsFoundFromFarAway) {
   EXPECT_FALSE(scene.nearest({{5e3f, 1.1e-3f, 0.5f}, {-1, 0, 0}}, 0, kInfinity).found());
 }
 
-const char* const kTube =
-    "<shape type=\"cylinder\"><float name=\"radius\" value=\"0.4\"/><point name=\"p1\" x=\"0.5\" y=\"1\" z=\"1\"/>"
-    "<emitter type=\"area\"/></shape>";
+/// A lamp around an axis from the origin on; 1: to (0.5, 1, 1).
+std::string tube(double length) {
+  return fmt::format(R"(<shape type="cylinder"><float name="radius" value="0.4"/>
+    <point name="p1" x="{}" y="{}" z="{}"/><emitter type="area"/></shape>)",
+                     0.5 * length, length, length);
+}
+/// Tests of the lamp's samples have to reject those of this one.
+constexpr double kTooLong = 1.05;
 
 TEST(Cylinder, ShinesUniformlyByArea) {
-  const SceneSnapshot scene = test::build(kTube);
-  const EmitterView& emitter = scene->view.emitters[0];
-  const ShapeView& tube = scene->view.surfaces[0];
-  EXPECT_NEAR(emitter.area, kTwoPi * 0.4f * 1.5f, 1e-5f);
-  Pcg32 rng(7);
-  std::vector<double> counts(64, 0.0);
-  for (int i = 0; i < 100'000; ++i) {
-    const LightPoint on = uniformPointOnShape(tube, emitter, {rng.next(), rng.next()});
-    EXPECT_EQ(on.areaPdf, 1 / emitter.area);
-    const Vec2 uv = surfaceUv(tube, on.p, 0, {});
-    const int i8 = std::min(7, static_cast<int>(uv.x * 8)), j8 = std::min(7, static_cast<int>(uv.y * 8));
-    ++counts[static_cast<size_t>(8 * j8 + i8)];
-    ASSERT_NEAR(dot(on.normal, tube.normal), 0, 1e-5f);
+  const SceneSnapshot scene = test::build(tube(1)), longer = test::build(tube(kTooLong));
+  const ShapeView& shape = scene->view.surfaces[0];
+  EXPECT_NEAR(scene->view.emitters[0].area, kTwoPi * 0.4f * 1.5f, 1e-5f);
+  const auto p = [&](const Scene& own) {
+    const EmitterView& emitter = own.view.emitters[0];
+    Pcg32 rng(7);
+    std::vector<double> counts(64, 0.0);
+    for (int i = 0; i < 100'000; ++i) {
+      const LightPoint on = uniformPointOnShape(own.view.surfaces[0], emitter, {rng.next(), rng.next()});
+      EXPECT_EQ(on.areaPdf, 1 / emitter.area);
+      const Vec2 uv = surfaceUv(shape, on.p, 0, {});
+      const int i8 = std::min(7, static_cast<int>(uv.x * 8)), j8 = std::min(7, static_cast<int>(uv.y * 8));
+      ++counts[static_cast<size_t>(8 * j8 + i8)];
+      EXPECT_NEAR(dot(on.normal, shape.normal), 0, 1e-5f);
+    }
+    return stats::chiSquaredCounts(counts, std::vector<double>(64, 1e5 / 64));
+  };
+  EXPECT_GT(p(*scene), 1e-4);
+  EXPECT_LT(p(*longer), 1e-4) << "the test cannot fail";
+}
+
+/// What the lamp's lit side is seen as from x: a hit, or nothing. Not through an end, onto the inside.
+std::optional<SurfacePoint> litPoint(const Scene& scene, Vec3 x, Vec3 w) {
+  const RayHit hit = scene.surfaceRays->nearest({x, w}, 0, kInfinity);
+  if (!hit.found()) return std::nullopt;
+  const SurfacePoint p = surfacePoint(scene.view.surfaces[0], {x, w}, hit, scene.view.scale);
+  return dot(p.geometricNormal, w) < 0 ? std::optional(p) : std::nullopt;
+}
+
+/// The solid angle of the lit side, and the integral of 1 + cos(angle to the lamp's axis) over it.
+struct LitIntegrals {
+  stats::Moments integrals[2];
+  void add(double whole, Vec3 w) {
+    integrals[0].add(whole);
+    integrals[1].add(whole * static_cast<double>(1 + w.z));
   }
-  EXPECT_GT(stats::chiSquaredCounts(counts, std::vector<double>(64, 1e5 / 64)), 1e-4);
+};
+
+LitIntegrals fromLightSamples(const Scene& scene, Vec3 x) {
+  const EmitterView& emitter = scene.view.emitters[0];
+  LitIntegrals found;
+  Pcg32 rng(11);
+  for (int i = 0; i < 200'000; ++i) {
+    const LightSample s = sampleLight(scene.view, emitter, x, {rng.next(), rng.next()});
+    const bool seen = s.pdf > 0 && !scene.surfaceRays->occluded({x, s.wi}, 0, s.distance * 0.999f);
+    found.add(seen ? 1 / static_cast<double>(s.pdf) : 0, s.wi);
+    const auto on = seen ? litPoint(scene, x, s.wi) : std::nullopt;
+    if (!on || std::fabs(dot(on->geometricNormal, s.wi)) < 0.02f) continue;
+    EXPECT_NEAR(s.pdf, areaLightPdf(scene.view.surfaces[0], emitter, x, on->p, on->geometricNormal), 1e-2f * s.pdf);
+  }
+  return found;
+}
+
+LitIntegrals fromDirections(const Scene& scene, Vec3 x) {
+  const Frame toTube(normalize(Vec3(0.25f, 0.5f, 0.5f) - x));
+  constexpr float kHeight = 0.5f;
+  LitIntegrals found;
+  Pcg32 rng(12);
+  for (int i = 0; i < 200'000; ++i) {
+    const Vec3 w = toTube.toWorld(uniformCone({rng.next(), rng.next()}, kHeight));
+    found.add(litPoint(scene, x, w) ? static_cast<double>(kTwoPi * kHeight) : 0, w);
+  }
+  return found;
 }
 
 // At its silhouette the density of directions is infinite, so not cell by cell: by integrals over the directions in
 // which its lit side is seen, against directions that are drawn without knowledge of the light.
 TEST(Cylinder, LightSamplesHaveTheDensityOfTheirDirections) {
-  const SceneSnapshot scene = test::build(kTube);
-  const EmitterView& emitter = scene->view.emitters[0];
-  const ShapeView& tube = scene->view.surfaces[0];
-  const Vec3 x(1.5f, -0.5f, 0.3f), axis(0, 0, 1);
-  const Frame toTube(normalize(Vec3(0.25f, 0.5f, 0.5f) - x));
-  constexpr float kHeight = 0.5f;
-  const auto lit = [&](Vec3 w) -> std::optional<SurfacePoint> {
-    const RayHit hit = scene->surfaceRays->nearest({x, w}, 0, kInfinity);
-    if (!hit.found()) return std::nullopt;
-    const SurfacePoint p = surfacePoint(tube, {x, w}, hit, scene->view.scale);
-    return dot(p.geometricNormal, w) < 0 ? std::optional(p) : std::nullopt;  // not through an end, onto the inside
-  };
-  Pcg32 rng(11);
-  stats::Moments sampled[2], uniform[2];
-  for (int i = 0; i < 200'000; ++i) {
-    const LightSample s = sampleLight(scene->view, emitter, x, {rng.next(), rng.next()});
-    const bool seen = s.pdf > 0 && !scene->surfaceRays->occluded({x, s.wi}, 0, s.distance * 0.999f);
-    const double inverse = seen ? 1 / static_cast<double>(s.pdf) : 0;
-    sampled[0].add(inverse);
-    sampled[1].add(inverse * static_cast<double>(1 + dot(s.wi, axis)));
-    const Vec3 w = toTube.toWorld(uniformCone({rng.next(), rng.next()}, kHeight));
-    const auto p = lit(w);
-    const double whole = p ? static_cast<double>(kTwoPi * kHeight) : 0;
-    uniform[0].add(whole);
-    uniform[1].add(whole * static_cast<double>(1 + dot(w, axis)));
-    if (!seen) continue;
-    const auto on = lit(s.wi);
-    if (!on || std::fabs(dot(on->geometricNormal, s.wi)) < 0.02f) continue;
-    ASSERT_NEAR(s.pdf, areaLightPdf(tube, emitter, x, on->p, on->geometricNormal), 1e-2f * s.pdf);
-  }
+  const Vec3 x(1.5f, -0.5f, 0.3f);
+  const SceneSnapshot scene = test::build(tube(1));
+  const LitIntegrals truth = fromDirections(*scene, x), own = fromLightSamples(*scene, x),
+                     longer = fromLightSamples(*test::build(tube(kTooLong)), x);
   for (int i = 0; i < 2; ++i) {
-    EXPECT_GT(stats::welchTest(sampled[i], uniform[i]), 1e-4) << sampled[i].mean() << " " << uniform[i].mean();
-    EXPECT_LT(sampled[i].standardError() + uniform[i].standardError(), 0.02 * uniform[i].mean()) << "cannot tell";
+    const stats::Moments &sampled = own.integrals[i], &uniform = truth.integrals[i];
+    EXPECT_GT(stats::welchTest(sampled, uniform), 1e-4) << sampled.mean() << " " << uniform.mean();
+    EXPECT_LT(stats::welchTest(longer.integrals[i], uniform), 1e-4) << "the test cannot fail";
   }
 }
 

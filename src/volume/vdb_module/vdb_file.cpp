@@ -13,13 +13,11 @@
 #include <openvdb/tools/Dense.h>
 #include <openvdb/util/logging.h>
 
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 #include <mutex>
 #include <sstream>
 
 #include "core/byte_hash.h"
+#include "core/large_array.h"
 #include "volume/grid_factory.h"
 #include "volume/grid_listing.h"
 #include "volume/vdb_module/memory_stream.h"
@@ -315,13 +313,6 @@ class VdbWriter : private openvdb::io::Archive {
   }
 };
 
-// OpenVDB's nodes are many small blocks, which the C library keeps for later when they are freed.
-void returnFreedMemory() {
-#ifdef __GLIBC__
-  malloc_trim(0);
-#endif
-}
-
 std::shared_ptr<const Grid> loadVdb(AlignedBytes bytes, const VolumeRequest& request, const GridOptions& options) {
   openvdb::GridBase::Ptr grid = guarded([&] {
     VdbReader reader(bytes);
@@ -334,14 +325,15 @@ std::shared_ptr<const Grid> loadVdb(AlignedBytes bytes, const VolumeRequest& req
     return read;
   });
   bytes = {};
+  returnFreedMemory();
   AlignedBytes tree = nanoTree(grid);
   grid.reset();
-  returnFreedMemory();
+  returnFreedMemory();  // its nodes were many small blocks
   return GridFactory::tree(std::move(tree), options);
 }
 
 std::vector<GridInfo> vdbInfo(AlignedBytes bytes) {
-  std::vector<GridInfo> infos = guarded([&] {
+  return guarded([&] {
     VdbReader reader(bytes);
     const std::vector<std::string> names = namesOf(reader.entries());
     std::vector<GridInfo> list;
@@ -357,8 +349,6 @@ std::vector<GridInfo> vdbInfo(AlignedBytes bytes) {
     }
     return list;
   });
-  returnFreedMemory();
-  return infos;
 }
 
 bool expandBlosc(const std::byte* compressed, size_t compressedSize, std::byte* out, size_t size) try {
