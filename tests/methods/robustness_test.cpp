@@ -65,7 +65,7 @@ std::string closedTube(const std::string& media) {
   return elements;
 }
 
-TEST(Boundaries, ATubeIsClosedByDisks) {
+TEST(OpenBoundaries, ATubeIsClosedByDisks) {
   const std::string black = R"(<float name="sigma_t" value="1"/><float name="albedo" value="0"/></medium>)";
   const std::string interior = R"(<medium type="homogeneous" name="interior">)" + black;
   const std::string exterior =
