@@ -47,6 +47,88 @@ __global__ void walkFromLights(SceneView scene, StubRays rays, MediaRay start, R
   });
 }
 
+__global__ void gatherOnEyePaths(SceneView scene, StubRays rays, VirtualLightsView lights, LightVisibilityView visibility,
+                                 ImsOptions options, View<LampTable> tables, PerspectiveCamera camera, Rgb* out) {
+  Sampler sampler(SampleId{1, 2, threadIdx.x, 3});
+  const ImsEyePaths<StubRays> paths(scene, rays, lights, visibility, options, tables);
+  const CameraRay ray = camera.ray(0.5f, 0.5f);
+  out[threadIdx.x] = paths.trace(ray, sampler).sum() + paths.traceGlow(ray, sampler).sum();
+}
+
+/// What `fast` knows of a pixel.
+__global__ void seeAndLight(SceneView scene, StubRays rays, VirtualLightsView lights, LightVisibilityView visibility,
+                            ImsOptions options, View<LampTable> tables, PerspectiveCamera camera, PixelFeatures* seen,
+                            Rgb* out) {
+  Sampler sampler(SampleId{1, 2, threadIdx.x, 3});
+  const ImsEyePaths<StubRays> paths(scene, rays, lights, visibility, options, tables);
+  MarchedEye eye;
+  marchEye(scene, rays, camera.ray(0.5f, 0.5f), 0.5f, eye, options.eyeSteps);
+  seen[threadIdx.x] = pixelFeatures(eye);
+  out[threadIdx.x] = paths.light(eye, sampler).sum();
+}
+
+/// Receivers of a frame from `i` on.
+__device__ KernelReceivers receiversFrom(const KernelReceivers& all, int i) {
+  return {1,           all.px + i, all.py + i, all.pz + i, all.ax + i, all.ay + i, all.az + i, all.anisotropy + i,
+          all.r + i, all.g + i,  all.b + i};
+}
+
+template <EndKind light, EndKind receiver, NearField::Kind near>
+__device__ void gatherOne(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
+                          const KernelShadowMap& map, float bound) {
+  float seen[3];
+  kernels::seenThroughFog({l.px, l.py, l.pz}, to, bound, &seen[0]);
+  kernels::seenThroughTable({l.px, l.py, l.pz}, to, table, &seen[0]);
+  kernels::seenThroughMap<receiver>(l, to, map, &seen[0]);
+  kernels::gather<light, receiver, near>(l, to, seen, seen, seen, bound);
+  kernels::gatherThrough<light, receiver, near>(l, to, kernels::FogBetween{bound}, map, bound);
+  kernels::gatherThrough<light, receiver, near>(l, to, kernels::TableBetween{table}, map, bound);
+}
+
+/// A receiver each: all lights.
+__global__ void gatherInFrame(View<KernelLight> lights, KernelReceivers receivers, View<DepthTable> tables,
+                              View<KernelShadowMap> maps, float bound) {
+  const KernelReceivers to = receiversFrom(receivers, static_cast<int>(threadIdx.x));
+  constexpr auto kClamped = NearField::Kind::clamped, kSpread = NearField::Kind::spread;
+  for (int i = 0; i < lights.size; ++i) {
+    gatherOne<EndKind::lambertian, EndKind::lambertian, kClamped>(lights[i], to, tables[i], maps[i], bound);
+    gatherOne<EndKind::lambertian, EndKind::henyeyGreenstein, kSpread>(lights[i], to, tables[i], maps[i], bound);
+    gatherOne<EndKind::henyeyGreenstein, EndKind::isotropic, kSpread>(lights[i], to, tables[i], maps[i], bound);
+  }
+}
+
+/// A packet of pixels each: their lamps.
+__global__ void lightPackets(LampPoint lamp, KernelSurfaces* surfaces, FogRays* fog, KernelPlaces* places,
+                             RayPacket* rays, float (*value)[3][RayPacket::kSize]) {
+  const auto n = threadIdx.x;
+  const KernelSurfaces& s = surfaces[n];
+  float* first = value[n][0];
+  kernels::lampOnSurfaces(lamp, s, first);
+  kernels::aimAtLamp(lamp, s, s.epsilon, s.gx, s.gy, s.gz, first, kHitError, 1, rays[n]);
+  kernels::lampInFog(lamp, fog[n], 0.5f, places[n], value[n]);
+  kernels::lampInMedia(lamp, places[n], first);
+}
+
+/// A packet of pixels each: their eye rays through a grid.
+__global__ void marchPackets(KernelGrid grid, KernelEyes* eyes, KernelDepths* depths, EyePoints* points, LampPoint lamp,
+                             const float* places, float* out) {
+  const auto n = threadIdx.x;
+  kernels::march(grid, eyes[n], depths[n]);
+  kernels::pointsAt(eyes[n], depths[n], 0.5f, points[n]);
+  kernels::depthsAlong(eyes[n], depths[n], 0, places, 1, out + 32 * n);
+  kernels::lampAtPoints(lamp, eyes[n], points[n], 0.6f, out + 32 * n + 1);
+}
+
+/// A block of pixels each, between the same coarse ones.
+__global__ void spreadOverBlocks(const UpsamplingBlock* blocks, const UpsamplingTap* taps, UpsamplingWeights* weights,
+                                 UpsampledLight* light) {
+  const auto n = threadIdx.x;
+  const UpsamplingTap* own[UpsamplingBlock::kTaps];
+  for (int i = 0; i < UpsamplingBlock::kTaps; ++i) own[i] = taps + i;
+  kernels::weighTaps(blocks[n], own, weights[n]);
+  kernels::spreadLight(blocks[n], own, weights[n], light[n]);
+}
+
 __global__ void lookUp(GridView grid, RgbGridView colors, PhaseFunction phase, const Vec3* at, float* out) {
   const Vec3 p = at[threadIdx.x];
   const PhaseSample s = phase.sample(p, {p.x, p.y});
