@@ -13,6 +13,7 @@ struct StubRays {
 
   __host__ __device__ RayHit nearest(const Ray& ray, float tMax) const { return ray.d.x < tMax ? hit : RayHit(); }
   __host__ __device__ bool occluded(const Ray& ray, float tMax) const { return hit.t < tMax * ray.d.x; }
+  __host__ __device__ uint32_t occluded(const RayPacket& rays) const { return occluded(rays.ray(0), rays.tMax[0]); }
   __host__ __device__ void crossings(const Ray& ray, float tMin, float tMax, CrossingList& out) const {
     for (int i = 0; i < list.count; ++i)
       if (list.items[i].t > tMin * ray.d.y && list.items[i].t < tMax) out.insert(list.items[i]);
@@ -28,6 +29,15 @@ __global__ void tracePaths(SceneView scene, StubRays rays, PathOptions options, 
   const Vec2 offset = filter.sample(sampler.next2D());
   const PathTracer<StubRays> tracer(scene, rays, options);
   out[pixel] = tracer.trace(camera.ray(offset.x, offset.y), sampler).sum();
+}
+
+/// A group of pixels each.
+__global__ void sharePaths(SceneView scene, StubRays rays, PathOptions options, const CameraRay* cameras, Sampler* samplers,
+                           LayerRadiance* out) {
+  const uint32_t first = threadIdx.x * SharedPaths<StubRays>::kMost;
+  const PathTracer<StubRays> tracer(scene, rays, options);
+  const SharedPaths<StubRays> shared(scene, rays, tracer);
+  shared.trace(cameras + first, samplers + first, SharedPaths<StubRays>::kMost, out + first);
 }
 
 __global__ void marchEyes(SceneView scene, StubRays rays, View<LampTable> tables, PerspectiveCamera camera, Rgb* out) {
@@ -80,9 +90,10 @@ __device__ void gatherOne(const KernelLight& l, const KernelReceivers& to, const
   kernels::seenThroughFog({l.px, l.py, l.pz}, to, bound, &seen[0]);
   kernels::seenThroughTable({l.px, l.py, l.pz}, to, table, &seen[0]);
   kernels::seenThroughMap<receiver>(l, to, map, &seen[0]);
-  kernels::gather<light, receiver, near>(l, to, seen, seen, seen, bound);
-  kernels::gatherThrough<light, receiver, near>(l, to, kernels::FogBetween{bound}, map, bound);
-  kernels::gatherThrough<light, receiver, near>(l, to, kernels::TableBetween{table}, map, bound);
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenInArrays{seen, seen, seen}, bound);
+  using kernels::FogBetween, kernels::TableBetween;
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, FogBetween>{{bound}, map}, bound);
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, TableBetween>{{table}, map}, bound);
 }
 
 /// A receiver each: all lights.
