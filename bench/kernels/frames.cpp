@@ -6,11 +6,13 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <sstream>
 
 #include "loaders/mitsuba_xml.h"
+#include "methods/instant_scattering/pixel_features.h"
 #include "methods/render_session.h"
 #include "scene/builder.h"
 #include "volume/procedural.h"
@@ -65,6 +67,32 @@ RenderSession::Options options(int64_t lights) {
   return {.settings = {.values = {{"mode", "frame"}, {"lights", std::to_string(lights)}}}};
 }
 
+/// What a picture of a scene looks up and evaluates, at the least: not what its tables and shadow maps do, nor the
+/// pixels that the filter cannot make.
+struct Work {
+  int64_t samples = 0;    ///< of grids along the eye rays, those where nothing is left out
+  int64_t receivers = 0;  ///< that each light lights
+
+  explicit Work(const Scene& scene) {
+    constexpr int kSteps = 128, kSpacing = 8, kPoints = 4;
+    const auto eye = std::make_unique<MarchedEye>();
+    for (int y = 0; y < scene.camera.height; ++y)
+      for (int x = 0; x < scene.camera.width; ++x) {
+        marchMiddle(scene, x, y, kSteps, *eye);
+        for (int i = 0; i < eye->steps; ++i) samples += isGrid(scene, eye->media[eye->step[i].stretch]) ? 1 : 0;
+        if (x % kSpacing != kSpacing / 2 || y % kSpacing != kSpacing / 2 || !eye->plain) continue;
+        receivers += (eye->opacity() > 0 ? kPoints : 0) + (eye->hit.found() ? 1 : 0);
+      }
+  }
+
+ private:
+  static bool isGrid(const Scene& scene, const MediaState& media) {
+    for (int i = 0; i < media.count(); ++i)
+      if (!scene.view.media[media.medium(i)].homogeneous) return true;
+    return false;
+  }
+};
+
 /// Walks, tables, shadow maps and a picture.
 void first(benchmark::State& state, const std::function<SceneSnapshot()>& build) {
   const SceneSnapshot scene = build();
@@ -73,15 +101,21 @@ void first(benchmark::State& state, const std::function<SceneSnapshot()>& build)
     session.step();
   }
 }
-/// The camera has moved: the lights stay.
+/// The camera has moved: the lights stay. Counters: of a CPU second of the whole frame.
 void steady(benchmark::State& state, const std::function<SceneSnapshot()>& build) {
   const SceneSnapshot scene = build();
   RenderSession session(scene, findMethod("ims"), options(state.range(0)));
   session.step();
+  const Work work(*scene);
+  const std::clock_t start = std::clock();
   for (auto _ : state) {
     session.edit(scene, {{{{"camera"}, Aspect::camera}}});
     session.step();
   }
+  const double frames =
+      static_cast<double>(state.iterations()) * CLOCKS_PER_SEC / static_cast<double>(std::clock() - start);
+  state.counters["evaluations"] = static_cast<double>(work.receivers * state.range(0)) * frames;
+  state.counters["samples"] = static_cast<double>(work.samples) * frames;
 }
 
 void add(const std::string& name, const std::function<SceneSnapshot()>& build) {
