@@ -12,7 +12,7 @@
 #include <sstream>
 
 #include "loaders/mitsuba_xml.h"
-#include "methods/instant_scattering/pixel_features.h"
+#include "methods/instant_scattering/upsampling.h"
 #include "methods/render_session.h"
 #include "scene/builder.h"
 #include "volume/procedural.h"
@@ -67,30 +67,43 @@ RenderSession::Options options(int64_t lights) {
   return {.settings = {.values = {{"mode", "frame"}, {"lights", std::to_string(lights)}}}};
 }
 
-/// What a picture of a scene looks up and evaluates, at the least: not what its tables and shadow maps do, nor the
-/// pixels that the filter cannot make.
+/// What a steady picture of a scene looks up and evaluates.
 struct Work {
-  int64_t samples = 0;    ///< of grids along the eye rays, those where nothing is left out
+  int64_t samples = 0;    ///< of grids along the eye rays, without those that are 0
   int64_t receivers = 0;  ///< that each light lights
 
-  explicit Work(const Scene& scene) {
-    constexpr int kSteps = 128, kSpacing = 8, kPoints = 4;
-    const auto eye = std::make_unique<MarchedEye>();
-    for (int y = 0; y < scene.camera.height; ++y)
-      for (int x = 0; x < scene.camera.width; ++x) {
-        marchMiddle(scene, x, y, kSteps, *eye);
-        for (int i = 0; i < eye->steps; ++i) samples += isGrid(scene, eye->media[eye->step[i].stretch]) ? 1 : 0;
-        if (x % kSpacing != kSpacing / 2 || y % kSpacing != kSpacing / 2 || !eye->plain) continue;
-        receivers += (eye->opacity() > 0 ? kPoints : 0) + (eye->hit.found() ? 1 : 0);
+  explicit Work(const Scene& scene) : scene_(scene), eye_(std::make_unique<MarchedEye>()) {
+    const int width = scene.camera.width, height = scene.camera.height;
+    std::vector<PixelFeatures> features;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        march(x, y);
+        features.push_back(pixelFeatures(*eye_));
+        for (int i = 0; i < eye_->steps; ++i) samples += isGrid(eye_->media[eye_->step[i].stretch]) ? 1 : 0;
       }
+    const Upsampling upsampling(features, width, height, 8);
+    const std::vector<Upsampling::Light> none(upsampling.coarse().size());
+    light(upsampling.coarse());
+    light(upsampling.spread(none, {}, [](int, int, const Upsampling::Light&) {}));
   }
 
  private:
-  static bool isGrid(const Scene& scene, const MediaState& media) {
+  void march(int x, int y) { marchMiddle(scene_, x, y, 128, *eye_); }
+  void light(const std::vector<Upsampling::Pixel>& pixels) {
+    constexpr int kPoints = 4;
+    for (const auto [x, y] : pixels) {
+      march(x, y);
+      if (eye_->plain) receivers += (eye_->opacity() > 0 ? kPoints : 0) + (eye_->hit.found() ? 1 : 0);
+    }
+  }
+  bool isGrid(const MediaState& media) const {
     for (int i = 0; i < media.count(); ++i)
-      if (!scene.view.media[media.medium(i)].homogeneous) return true;
+      if (!scene_.view.media[media.medium(i)].homogeneous) return true;
     return false;
   }
+
+  const Scene& scene_;
+  std::unique_ptr<MarchedEye> eye_;
 };
 
 /// Walks, tables, shadow maps and a picture.
