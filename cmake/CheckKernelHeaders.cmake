@@ -30,6 +30,8 @@ file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/kernels/kernel_headers.h CONTENT "${ke
 
 set(kernel_flags -std=c++20 --expt-relaxed-constexpr -arch=sm_80 -Werror all-warnings -ccbin ${CMAKE_CXX_COMPILER}
     -I${CMAKE_SOURCE_DIR}/src -I${CMAKE_BINARY_DIR}/kernels)
+# Compensation of virtual lights recurses; how deep, a launcher says by the stack that it sets.
+list(APPEND kernel_flags -Xptxas --suppress-stack-size-warning)
 # Nothing runs what it makes, and optimising it takes nine tenths of the time.
 execute_process(COMMAND ${VIRGA_NVCC} --help OUTPUT_VARIABLE nvcc_help ERROR_QUIET)
 if(nvcc_help MATCHES "-Ofast-compile")

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The kernels of a frame: virtual lights that light receivers, and densities along a ray; each beside a plain loop.
+// Items are evaluations (a light and a receiver) or samples of the grid.
 #include <benchmark/benchmark.h>
 
 #include <vector>
@@ -93,6 +94,31 @@ BENCHMARK(frame<EndKind::lambertian, EndKind::isotropic, false>);
 BENCHMARK(frame<EndKind::henyeyGreenstein, EndKind::henyeyGreenstein, false>);
 BENCHMARK(frame<EndKind::isotropic, EndKind::isotropic, true>);
 BENCHMARK(frame<EndKind::henyeyGreenstein, EndKind::henyeyGreenstein, true>);
+
+/// All at once, through each light's own shadow map (and table): the loop that a frame spends its time in.
+template <EndKind from, EndKind to, bool table>
+void fused(benchmark::State& state) {
+  constexpr int kMap = 32, kTexels = kMap * kMap, kNodes = kSide * kSide * kRadii;
+  Receivers r;
+  const std::vector<KernelLight> all = lights();
+  const std::vector<float> depths = numbers(table ? kLights * kNodes : 0, 9), maps(kLights * kTexels, 10.f);
+  const KernelReceivers view = r.view();
+  for (auto _ : state)
+    for (size_t i = 0; i < kLights; ++i) {
+      const DepthTable looked{
+          depths.data() + (table ? i * kNodes : 0), kSide, kRadii, {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1.8f}};
+      gatherThrough(all[i], from, view, to, table ? &looked : nullptr, 0.85f, {&maps[i * kTexels], kMap, 0.125f, 0.1f},
+                    {NearField::Kind::spread, 25});
+    }
+  benchmark::DoNotOptimize(r.sum[0].data());
+  state.SetItemsProcessed(state.iterations() * kReceivers * kLights);
+}
+BENCHMARK(fused<EndKind::isotropic, EndKind::isotropic, false>);
+BENCHMARK(fused<EndKind::lambertian, EndKind::isotropic, false>);
+BENCHMARK(fused<EndKind::isotropic, EndKind::lambertian, false>);
+BENCHMARK(fused<EndKind::henyeyGreenstein, EndKind::henyeyGreenstein, false>);
+BENCHMARK(fused<EndKind::isotropic, EndKind::isotropic, true>);
+BENCHMARK(fused<EndKind::henyeyGreenstein, EndKind::henyeyGreenstein, true>);
 
 struct Plume {
   std::shared_ptr<const Grid> grid;

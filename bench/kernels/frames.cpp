@@ -4,9 +4,11 @@
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
 
+#include <ctime>
 #include <functional>
 
 #include "bench_scenes.h"
+#include "methods/instant_scattering/upsampling.h"
 #include "methods/render_session.h"
 
 namespace virga {
@@ -16,6 +18,45 @@ RenderSession::Options options(int64_t lights) {
   return {.settings = {.values = {{"mode", "frame"}, {"lights", std::to_string(lights)}}}};
 }
 
+/// What a steady picture of a scene looks up and evaluates.
+struct Work {
+  int64_t samples = 0;    ///< of grids along the eye rays, without those that are 0
+  int64_t receivers = 0;  ///< that each light lights
+
+  explicit Work(const Scene& scene) : scene_(scene), eye_(std::make_unique<MarchedEye>()) {
+    const int width = scene.camera.width, height = scene.camera.height;
+    std::vector<PixelFeatures> features;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        march(x, y);
+        features.push_back(pixelFeatures(*eye_));
+        for (int i = 0; i < eye_->steps; ++i) samples += isGrid(eye_->media[eye_->step[i].stretch]) ? 1 : 0;
+      }
+    const Upsampling upsampling(features, width, height, 8);
+    const std::vector<Upsampling::Light> none(upsampling.coarse().size());
+    light(upsampling.coarse());
+    light(upsampling.spread(none, {}, [](int, int, const Upsampling::Light&) {}));
+  }
+
+ private:
+  void march(int x, int y) { marchMiddle(scene_, x, y, 128, *eye_); }
+  void light(const std::vector<Upsampling::Pixel>& pixels) {
+    constexpr int kPoints = 4;
+    for (const auto [x, y] : pixels) {
+      march(x, y);
+      if (eye_->plain) receivers += (eye_->opacity() > 0 ? kPoints : 0) + (eye_->hit.found() ? 1 : 0);
+    }
+  }
+  bool isGrid(const MediaState& media) const {
+    for (int i = 0; i < media.count(); ++i)
+      if (!scene_.view.media[media.medium(i)].homogeneous) return true;
+    return false;
+  }
+
+  const Scene& scene_;
+  std::unique_ptr<MarchedEye> eye_;
+};
+
 /// Walks, tables, shadow maps and a picture.
 void first(benchmark::State& state, const std::function<SceneSnapshot()>& build) {
   const SceneSnapshot scene = build();
@@ -24,15 +65,21 @@ void first(benchmark::State& state, const std::function<SceneSnapshot()>& build)
     session.step();
   }
 }
-/// The camera has moved: the lights stay.
+/// The camera has moved: the lights stay. Counters: of a CPU second of the whole frame.
 void steady(benchmark::State& state, const std::function<SceneSnapshot()>& build) {
   const SceneSnapshot scene = build();
   RenderSession session(scene, findMethod("ims"), options(state.range(0)));
   session.step();
+  const Work work(*scene);
+  const std::clock_t start = std::clock();
   for (auto _ : state) {
     session.edit(scene, {{{{"camera"}, Aspect::camera}}});
     session.step();
   }
+  const double frames =
+      static_cast<double>(state.iterations()) * CLOCKS_PER_SEC / static_cast<double>(std::clock() - start);
+  state.counters["evaluations"] = static_cast<double>(work.receivers * state.range(0)) * frames;
+  state.counters["samples"] = static_cast<double>(work.samples) * frames;
 }
 
 void add(const std::string& name, const std::function<SceneSnapshot()>& build) {

@@ -11,11 +11,6 @@
 namespace virga {
 namespace {
 
-template <class T>
-View<T> viewOf(const std::vector<T>& v) {
-  return {v.data(), static_cast<int>(v.size())};
-}
-
 using RayScenePtr = std::shared_ptr<const RayScene>;
 
 RayScenePtr raysOf(const std::vector<std::shared_ptr<const BuiltShape>>& shapes, const RayScenePtr& previous) {

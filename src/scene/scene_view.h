@@ -21,6 +21,11 @@ struct View {
   VIRGA_HD const T* begin() const { return data; }
   VIRGA_HD const T* end() const { return data + size; }
 };
+/// Of a vector or the like, which must outlive it.
+template <class Container>
+View<typename Container::value_type> viewOf(const Container& c) {
+  return {c.data(), static_cast<int>(c.size())};
+}
 
 /// Which of a bsdf's colours are textures: their indices in the scene, in the order of the bsdf's colours; -1: none.
 struct BsdfTextures {

@@ -88,7 +88,7 @@ class LampTables {
   LampTables(const Scene& scene, int side, const std::stop_token& stop);
 
   /// One for each emitter, or none at all. Points into this object.
-  View<LampTable> view() const { return {tables_.data(), static_cast<int>(tables_.size())}; }
+  View<LampTable> view() const { return viewOf(tables_); }
 
  private:
   std::vector<LampTable> tables_;

@@ -27,6 +27,16 @@ VIRGA_HD inline ClippedRange whereFilled(const MediumView& medium, const Ray& ra
 /// Steps whose densities are looked up together.
 inline constexpr int kMarchedAtOnce = 32;
 
+/// Behind this optical depth a float's transmittance is 0.
+inline constexpr float kDark = 120;
+/// How far it is until all channels that are not clear are dark [unit], if that can be said in floats; 0 in a vacuum.
+VIRGA_HD inline float darkWithin(Rgb sigmaT) {
+  float least = kInfinity;
+  for (int c = 0; c < 3; ++c)
+    if (sigmaT[c] > 0) least = std::min(least, sigmaT[c]);
+  return std::min(kDark / least, 1e15f);
+}
+
 /// Optical depth of the media along a ray by steps of equal length, the first of them shifted by `shift` in [0, 1), so
 /// that neighbouring rays do not step in step: visit(t0, t1, optical depth of the step, media) front to back, until it
 /// returns false. Homogeneous media are exact, and a single step.
@@ -47,8 +57,14 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
     begin = std::min(begin, in.t0), end = std::max(end, in.t1);
   }
   if (!(begin < end) || !(thickest > 0)) return true;
-  // A stretch without end is dark beyond so many mean free paths.
-  if (std::isinf(end)) end = begin + 40 / thickest;
+  const auto sigmaTAt = [&](Vec3 p) {
+    Rgb sum;
+    for (int i = 0; i < media.count(); ++i) sum += scene.media[media.medium(i)].sigmaTAt(p);
+    return sum;
+  };
+  // Of a stretch without end this much is marched in steps, and in one step what lies behind it.
+  const bool endless = std::isinf(end);
+  if (endless) end = begin + (homogeneous ? darkWithin(sigmaTAt(ray.at(begin))) : 40 / thickest);
   if (homogeneous) steps = 1, shift = 0;
   const float step = (end - begin) / static_cast<float>(steps);
   const auto border = [&](int n) { return begin + step * std::max(0.f, static_cast<float>(n) - shift); };
@@ -74,13 +90,12 @@ VIRGA_HD bool marchMedia(const SceneView& scene, const MediaState& media, const 
   }
   for (int n = 0; n <= steps; ++n) {
     const float a = border(n), b = std::min(end, border(n + 1));
-    if (!(a < b)) continue;
-    const Vec3 p = ray.at(0.5f * (a + b));
-    Rgb sigmaT;
-    for (int i = 0; i < media.count(); ++i) sigmaT += scene.media[media.medium(i)].sigmaTAt(p);
-    if (!visit(a, b, sigmaT * (b - a))) return false;
+    if (a < b && !visit(a, b, sigmaTAt(ray.at(0.5f * (a + b))) * (b - a))) return false;
   }
-  return true;
+  if (!endless || homogeneous) return true;
+  const Rgb behind = sigmaTAt(ray.at(end));
+  const float length = darkWithin(behind);
+  return !(length > 0) || visit(end, end + length, behind * length);
 }
 
 /// Of an optical depth. Mostly it is grey, and one exponential does, or there is nothing.

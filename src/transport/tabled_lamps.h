@@ -41,7 +41,7 @@ class TabledLamps {
   TabledLamps(const Scene& scene, int side, const std::stop_token& stop);
 
   /// One for each emitter, or none at all if no lamp has a table. Points into this object.
-  View<TabledLamp> view() const { return {lamps_.data(), static_cast<int>(lamps_.size())}; }
+  View<TabledLamp> view() const { return viewOf(lamps_); }
 
  private:
   LampTables tables_;

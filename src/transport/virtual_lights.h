@@ -6,7 +6,7 @@
 
 #include "scene/scene.h"
 #include "transport/emitted_ray.h"
-#include "transport/light_walk.h"
+#include "transport/virtual_lights_view.h"
 
 namespace virga {
 
@@ -17,15 +17,8 @@ struct VirtualLights {
   std::vector<uint32_t> firstOf;            ///< of each walk, the first of its lights; one more entry than walks
 
   int walks() const { return static_cast<int>(firstOf.size()) - 1; }
+  VirtualLightsView view() const { return {viewOf(lights), viewOf(surfaces), viewOf(firstOf)}; }
 };
-
-/// Intensity of one of them toward w, the cosine at a surface left out [W/sr].
-VIRGA_HD inline Rgb intensity(const VirtualLights& lights, const SceneView& scene, const LightVertex& light, Vec3 w) {
-  if (light.kind == VertexKind::surface && light.surface < 0) return dot(w, light.normal) > 0 ? light.weight : Rgb();
-  if (light.kind == VertexKind::surface)
-    return light.weight * lights.surfaces[static_cast<size_t>(light.surface)].scattering(w, light.wi);
-  return light.weight * scene.media[light.medium].phaseAt(light.p).value(w, light.wi);
-}
 
 /// One list after the other.
 VirtualLights joined(const std::vector<VirtualLights>& parts);

@@ -201,6 +201,30 @@ TEST(MarchMedia, HomogeneousMediaAreExactAndEmptyOnesAreNothing) {
   EXPECT_EQ(marchedTransmittance(scene->view, rays, r, 3.5f, 7, 0.4f).r, 1);
 }
 
+// Through fog without end nothing comes, however thin it is in one channel; where it is clear all does. Likewise where
+// its density is that around a grid, and steps are taken.
+TEST(MarchMedia, StretchesWithoutEndAreDark) {
+  const std::string sensor = pinpointSensor("0, 0, 5", "0, 0, 0", "0, 1, 0", 4);
+  const SceneSnapshot scene =
+      sceneOf(R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="4, 0.004, 0"/></medium>)" +
+              std::string(sensor).replace(sensor.find("</sensor>"), 9, R"(<ref name="medium" id="fog"/></sensor>)"));
+  const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
+  const MediaRay r{{{0.1f, 0.2f, 5}, {0, 0, -1}}, scene->view.cameraMedia, 0};
+  SceneView view = scene->view;
+  std::vector<MediumView> media(view.media.begin(), view.media.end());
+  view.media = viewOf(media);
+  media[0].density = {};
+  media[0].density.background = 1;
+  for (const bool homogeneous : {true, false}) {
+    media[0].homogeneous = homogeneous;
+    const Rgb through = marchedTransmittance(view, rays, r, kInfinity, 24, 0.4f);
+    EXPECT_EQ(through.r, 0) << homogeneous;
+    EXPECT_EQ(through.g, 0) << homogeneous;
+    EXPECT_EQ(through.b, 1) << homogeneous;
+    EXPECT_NEAR(marchedTransmittance(view, rays, r, 100, 24, 0.4f).g, std::exp(-0.4f), 1e-4f) << homogeneous;
+  }
+}
+
 // A coarse march of a grid is near the truth for every shift, and 256 steps are nearer.
 TEST(MarchMedia, GridsConverge) {
   const SceneSnapshot scene = sceneOf(plume(8));

@@ -31,14 +31,14 @@ class Compensation {
   using Path = typename Tracer::Path;
   using Record = typename Tracer::Record;
 
-  Compensation(const SceneView& scene, const Rays& rays, const Tracer& tracer, const Gatherer<Rays>& gatherer,
-               const CompensationOptions& options)
+  VIRGA_HD Compensation(const SceneView& scene, const Rays& rays, const Tracer& tracer, const Gatherer<Rays>& gatherer,
+                        const CompensationOptions& options)
       : scene_(scene), rays_(rays), tracer_(tracer), gatherer_(gatherer), options_(options) {}
 
   /// Adds to `radiance` what clamping has taken at a vertex. `layers` ends with it; `events` came before it; `known` is
   /// what gathering there has told about the surfaces around.
-  void compensate(const Record& at, const KnownSpace& known, const LayerPath& layers, int events,
-                  LayerRadiance& radiance, Sampler& sampler, int level = 1) const {
+  VIRGA_HD void compensate(const Record& at, const KnownSpace& known, const LayerPath& layers, int events,
+                           LayerRadiance& radiance, Sampler& sampler, int level = 1) const {
     if (options_.levels >= 0 && level > options_.levels) return;
     const int count = options_.vertices[level > 1];
     for (int i = 0; i < count; ++i) {
@@ -57,8 +57,8 @@ class Compensation {
 
  private:
   /// All light that x' scatters: straight from lamps, through specular vertices, and that of virtual lights.
-  void light(const Record& at, const LayerPath& layers, int events, LayerRadiance& radiance, Sampler& sampler,
-             int level) const {
+  VIRGA_HD void light(const Record& at, const LayerPath& layers, int events, LayerRadiance& radiance, Sampler& sampler,
+                      int level) const {
     if (!tracer_.mayScatter(events)) return;
     Path path;
     path.layers = layers;
@@ -77,13 +77,13 @@ class Compensation {
     }
     radiance += path.radiance;
   }
-  void gather(const Record& at, Path& path, int events, Sampler& sampler, int level) const {
+  VIRGA_HD void gather(const Record& at, Path& path, int events, Sampler& sampler, int level) const {
     const bool last = options_.levels >= 0 && level >= options_.levels;
     const KnownSpace known = gatherer_.gather(at, events, path, options_.amounts[level > 1],
                                               last ? lastBound() : gatherer_.bound(), sampler);
     compensate(at, known, path.layers, events, path.radiance, sampler, level + 1);
   }
-  float lastBound() const {
+  VIRGA_HD float lastBound() const {
     switch (options_.ending) {
       case CompensationOptions::Ending::nothing:
         return gatherer_.bound();
@@ -95,7 +95,7 @@ class Compensation {
   }
 
   /// x' and the throughput to it; false where there is nothing.
-  bool findVertex(const Record& at, const KnownSpace& known, Record& next, Sampler& sampler) const {
+  VIRGA_HD bool findVertex(const Record& at, const KnownSpace& known, Record& next, Sampler& sampler) const {
     const NearbyVertex<Rays> nearby{scene_, rays_, options_.radius, gatherer_.bound()};
     const NearbyNumbers numbers{sampler.random2D(), sampler.random(), sampler.random2D(), sampler.random()};
     const auto isFree = [&](Vec3 w, float t) { return gatherer_.isFree(known, at.vertex.p, w, t); };

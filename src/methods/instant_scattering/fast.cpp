@@ -86,7 +86,7 @@ void FastRenderer::forget(const ChangeSet& changes) {
 }
 
 View<LampTable> FastRenderer::lampTables(const Scene& scene, const ImsOptions& options, const std::stop_token& stop) {
-  if (options.lampTable == 0 || !ImsPixels::marches(scene.view)) return {};
+  if (options.lampTable == 0 || !marchesLamps(scene.view)) return {};
   const int around = endlessMedium(scene);
   if (!tables_ || around != around_) {
     auto tables = std::make_unique<LampTables>(scene, options.lampTable, stop);

@@ -24,43 +24,38 @@ void withKind(EndKind kind, const Body& body) {
   }
 }
 
+template <EndKind kind, class Between>
+auto seenBy(Kind<kind>, const Between& between, const KernelShadowMap& map) {
+  return kernels::SeenThrough<kind, Between>{between, map};
+}
+
+/// kernels::gather; seenBy(Kind of the receivers) says what is between.
+template <class SeenBy>
+void gather(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, const NearField& near,
+            const SeenBy& seenBy) {
+  withKind(from, [&](auto f) {
+    withKind(kind, [&](auto k) {
+      if (near.kind == NearField::Kind::clamped)
+        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seenBy(k), near.bound);
+      else
+        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seenBy(k), near.bound);
+    });
+  });
+}
+
 }  // namespace
 
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near) {
-  withKind(from, [&](auto f) {
-    withKind(kind, [&](auto k) {
-      if (near.kind == NearField::Kind::clamped)
-        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seen[0], seen[1], seen[2], near.bound);
-      else
-        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seen[0], seen[1], seen[2], near.bound);
-    });
-  });
+  gather(light, from, to, kind, near, [&](auto) { return kernels::SeenInArrays{seen[0], seen[1], seen[2]}; });
 }
-
-namespace {
-
-template <class Between>
-void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
-                   const Between& between, const KernelShadowMap& map, const NearField& near) {
-  withKind(from, [&](auto f) {
-    withKind(kind, [&](auto k) {
-      if (near.kind == NearField::Kind::clamped)
-        kernels::gatherThrough<f.value, k.value, NearField::Kind::clamped>(light, to, between, map, near.bound);
-      else
-        kernels::gatherThrough<f.value, k.value, NearField::Kind::spread>(light, to, between, map, near.bound);
-    });
-  });
-}
-
-}  // namespace
 
 void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                    const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near) {
   if (table)
-    gatherThrough(light, from, to, kind, kernels::TableBetween{*table}, map, near);
+    gather(light, from, to, kind, near, [&](auto k) { return seenBy(k, kernels::TableBetween{*table}, map); });
   else
-    gatherThrough(light, from, to, kind, kernels::FogBetween{sigmaT}, map, near);
+    gather(light, from, to, kind, near, [&](auto k) { return seenBy(k, kernels::FogBetween{sigmaT}, map); });
 }
 
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {

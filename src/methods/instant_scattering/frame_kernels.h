@@ -119,30 +119,6 @@ VIRGA_HD static inline float connected(const KernelLight& l, float x, float y, f
   return term * endScattering<light>(cl, l.anisotropy) * endScattering<receiver>(cr, anisotropy);
 }
 
-/// One light, all receivers. `seen`: transmittance times visibility from the light to each of them, per channel.
-template <EndKind light, EndKind receiver, NearField::Kind near>
-VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const float* seenR,
-                                   const float* seenG, const float* seenB, float bound) {
-  const float* __restrict px = to.px;
-  const float* __restrict py = to.py;
-  const float* __restrict pz = to.pz;
-  float* __restrict r = to.r;
-  float* __restrict g = to.g;
-  float* __restrict b = to.b;
-#pragma omp simd
-  for (int i = 0; i < to.count; ++i) {
-    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i];
-    const float d2 = x * x + y * y + z * z + 1e-20f;
-    const float inverse = 1 / std::sqrt(d2);
-    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
-    const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
-    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound);
-    r[i] += value * l.r * seenR[i];
-    g[i] += value * l.g * seenG[i];
-    b[i] += value * l.b * seenB[i];
-  }
-}
-
 /// Transmittance from a point through a homogeneous medium that is everywhere.
 VIRGA_HD static inline void seenThroughFog(const KernelPoint& l, const KernelReceivers& to, float sigmaT, float* seen) {
 #pragma omp simd
@@ -232,30 +208,30 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
   }
 }
 
-/// gather() through grey media and the light's shadow map at once: most frames spend their time here.
-template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
-VIRGA_HD static inline void gatherThrough(const KernelLight& l, const KernelReceivers& to, const Between between,
-                                          const KernelShadowMap map, float bound) {
-  const float* __restrict px = to.px;
-  const float* __restrict py = to.py;
-  const float* __restrict pz = to.pz;
-  float* __restrict r = to.r;
-  float* __restrict g = to.g;
-  float* __restrict b = to.b;
-#pragma omp simd
-  for (int i = 0; i < to.count; ++i) {
-    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i] - 1e-10f;
-    const float d2 = x * x + y * y + z * z + 1e-20f;
-    const float inverse = 1 / std::sqrt(d2), distance = d2 * inverse;
-    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
-    const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
-    const bool seen = reaches<receiver>(map, depthToward(map, -x, -y, -z), distance, cr);
-    const float through = falling(between.depth(-x, -y, -z, distance, inverse));
-    const float value =
-        connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound) * (seen ? through : 0.f);
-    r[i] += value * l.r, g[i] += value * l.g, b[i] += value * l.b;
+/// What is seen of a receiver, channel by channel: transmittance times visibility.
+struct Seen {
+  float r, g, b;
+};
+/// As arrays say...
+struct SeenInArrays {
+  const float *r, *g, *b;
+
+  VIRGA_HD Seen at(int i, float, float, float, float, float, float) const { return {r[i], g[i], b[i]}; }
+};
+/// ...or through grey media and the light's shadow map, by the way (x, y, z) to the receiver, `inverse` over its
+/// length, and the cosine there. Most frames spend their time here.
+template <EndKind receiver, class Between>
+struct SeenThrough {
+  Between between;
+  KernelShadowMap map;
+
+  VIRGA_HD Seen at(int, float x, float y, float z, float distance, float inverse, float cr) const {
+    const bool seen = reaches<receiver>(map, depthToward(map, x, y, z + 1e-10f), distance, cr);
+    const float through = falling(between.depth(x, y, z + 1e-10f, distance, inverse));
+    const float all = seen ? through : 0.f;
+    return {all, all, all};
   }
-}
+};
 
 /// What lies between: a fog that is everywhere...
 struct FogBetween {
@@ -271,6 +247,31 @@ struct TableBetween {
     return depthToward(table, x, y, z, distance, inverse);
   }
 };
+
+/// One light, all receivers. `between`: SeenInArrays or SeenThrough.
+template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
+VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const Between between,
+                                   float bound) {
+  const float* __restrict px = to.px;
+  const float* __restrict py = to.py;
+  const float* __restrict pz = to.pz;
+  float* __restrict r = to.r;
+  float* __restrict g = to.g;
+  float* __restrict b = to.b;
+#pragma omp simd
+  for (int i = 0; i < to.count; ++i) {
+    const float x = l.px - px[i], y = l.py - py[i], z = l.pz - pz[i];
+    const float d2 = x * x + y * y + z * z + 1e-20f;
+    const float inverse = 1 / std::sqrt(d2);
+    const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
+    const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
+    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound);
+    const Seen seen = between.at(i, -x, -y, -z, d2 * inverse, inverse, cr);
+    r[i] += value * seen.r * l.r;
+    g[i] += value * seen.g * l.g;
+    b[i] += value * seen.b * l.b;
+  }
+}
 
 }  // namespace kernels
 

@@ -3,6 +3,7 @@
 
 #include "methods/instant_scattering/light_visibility.h"
 #include "methods/path/path_tracer.h"
+#include "transport/virtual_lights_view.h"
 
 namespace virga {
 
@@ -25,7 +26,7 @@ class Gatherer {
   using Path = typename PathTracer<Rays>::Path;
   using Record = typename PathTracer<Rays>::Record;
 
-  VIRGA_HD Gatherer(const SceneView& scene, const Rays& rays, const VirtualLights& lights,
+  VIRGA_HD Gatherer(const SceneView& scene, const Rays& rays, const VirtualLightsView& lights,
                     const LightVisibilityView& visibility, const GatherOptions& options)
       : scene_(scene), rays_(rays), lights_(lights), visibility_(visibility), options_(options) {}
 
@@ -36,36 +37,36 @@ class Gatherer {
   VIRGA_HD KnownSpace gather(const Record& at, int events, Path& path, const GatherAmount& amount, float bound,
                              Sampler& sampler) const {
     KnownSpace known;
-    if (lights_.lights.empty()) return known;
-    const int all = amount.walks > 0 ? lights_.walks() : static_cast<int>(lights_.lights.size());
+    if (lights_.lights.size == 0) return known;
+    const int all = amount.walks > 0 ? lights_.walks() : lights_.lights.size;
     const int count = amount.walks > 0 ? std::min(amount.walks, all) : std::min(amount.lights, all);
     // One of each of as many equal parts of the list: neighbours in it are of one walk.
     const float share = static_cast<float>(all) / static_cast<float>(count) / static_cast<float>(lights_.walks());
     const double start = static_cast<double>(sampler.random());
     const auto pick = [&](int j) {
       const double place = (j + start) / count * all;
-      return static_cast<size_t>(std::min(static_cast<int>(place), all - 1));
+      return static_cast<uint32_t>(std::min(static_cast<int>(place), all - 1));
     };
     if (amount.walks == 0)
       for (int j = 0; j < count; ++j) prefetch(&lights_.lights[pick(j)]);
     for (int j = 0; j < count; ++j) {
-      const size_t i = pick(j);
+      const uint32_t i = pick(j);
       if (amount.walks == 0)
         add(i, at, events, path, share, bound, known, sampler);
       else
-        for (size_t l = lights_.firstOf[i]; l < lights_.firstOf[i + 1]; ++l)
+        for (uint32_t l = lights_.firstOf[i]; l < lights_.firstOf[i + 1]; ++l)
           add(l, at, events, path, share, bound, known, sampler);
     }
     return known;
   }
   /// Is it known that no surface lies between x and a point in a direction w?
   VIRGA_HD bool isFree(const KnownSpace& known, Vec3 x, Vec3 w, float t) const {
-    return visibility_.isFree(known, lights_.lights.data(), x + w * t, t);
+    return visibility_.isFree(known, lights_.lights, x + w * t, t);
   }
 
  private:
-  VIRGA_HD void add(size_t index, const Record& at, int events, Path& path, float share, float bound, KnownSpace& known,
-                    Sampler& sampler) const {
+  VIRGA_HD void add(uint32_t index, const Record& at, int events, Path& path, float share, float bound,
+                    KnownSpace& known, Sampler& sampler) const {
     const LightVertex& light = lights_.lights[index];
     if (options_.maxDepth >= 0 && events + 2 + light.depth > options_.maxDepth) return;
     const Rgb found = from(index, at, bound, known, sampler);
@@ -75,7 +76,7 @@ class Gatherer {
     path.radiance.add(layers.layer(), found * share);
   }
   /// What one walk's light adds, as if there were no other walks.
-  VIRGA_HD Rgb from(size_t index, const Record& at, float bound, KnownSpace& known, Sampler& sampler) const {
+  VIRGA_HD Rgb from(uint32_t index, const Record& at, float bound, KnownSpace& known, Sampler& sampler) const {
     const LightVertex& light = lights_.lights[index];
     const Vertex& x = at.vertex;
     const Vec3 way = light.p - x.p;
@@ -98,7 +99,7 @@ class Gatherer {
 
   const SceneView& scene_;
   const Rays& rays_;
-  const VirtualLights& lights_;
+  VirtualLightsView lights_;
   LightVisibilityView visibility_;
   const GatherOptions& options_;
 };

@@ -28,7 +28,7 @@ struct LightVisibilityOptions {
 struct KnownSpace {
   float clearance = 0;  ///< [unit] no surface is nearer
   float distance = kInfinity;
-  size_t light = 0;  ///< the nearest one that sees the point, if the distance is finite
+  uint32_t light = 0;  ///< the nearest one that sees the point, if the distance is finite
 };
 
 /// As kernels take it. Lights are named by their number.
@@ -42,7 +42,7 @@ struct LightVisibilityView {
   /// Does a surface block the way `w` (unit) from x to a light, `distance` away? `ray` goes along it.
   template <class Rays>
   VIRGA_HD bool blocked(const Rays& rays, const ConnectingRay& ray, const Vertex& x, Vec3 w, float distance,
-                        size_t light) const {
+                        uint32_t light) const {
     switch (mode) {
       case Mode::none:
         return false;
@@ -56,7 +56,7 @@ struct LightVisibilityView {
     }
   }
   /// Adds what a light that sees x tells about the surfaces around x. `w`: from x to the light.
-  VIRGA_HD void learn(KnownSpace& known, const LightVertex& from, size_t light, Vec3 w, float distance) const {
+  VIRGA_HD void learn(KnownSpace& known, const LightVertex& from, uint32_t light, Vec3 w, float distance) const {
     if (mode == Mode::shadowMap && distance < known.distance) known.distance = distance, known.light = light;
     if (mode != Mode::minimumDepth) return;
     // A light on a surface knows of its own side alone.
@@ -65,7 +65,7 @@ struct LightVisibilityView {
     known.clearance = std::max(known.clearance, std::min(free, above));
   }
   /// Is it known that no surface lies on the way to a point that is `t` away?
-  VIRGA_HD bool isFree(const KnownSpace& known, const LightVertex* lights, Vec3 to, float t) const {
+  VIRGA_HD bool isFree(const KnownSpace& known, const View<LightVertex>& lights, Vec3 to, float t) const {
     if (mode == Mode::none) return true;
     if (mode == Mode::minimumDepth) return t < known.clearance;
     if (mode == Mode::exact || !(known.distance < kInfinity)) return false;

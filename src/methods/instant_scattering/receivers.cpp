@@ -102,6 +102,7 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
                                  const NearField& near, float* const seen[3]) {
   const FrameLights::Light& from = lights.lights()[i];
   const LightVertex& vertex = *from.vertex;
+  const VirtualLightsView all = lights.virtualLights().view();
   for (size_t n = 0; n < group.receivers.size(); ++n) {
     if (seen[0][n] == 0 && seen[1][n] == 0 && seen[2][n] == 0) continue;
     const Vertex& x = group.receivers[n].vertex;
@@ -115,7 +116,7 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
                            : cosine / d2 * (1 - clampedShareOf(cosine * receiving / d2, near.bound));
     // What plain receivers scatter apart from direction is in their throughput.
     const Rgb scattered = group.plain ? Rgb(plainScattering(group, n, w)) : x.scattering(w);
-    const Rgb value = scattered * intensity(lights.virtualLights(), scene, vertex, -w) * (term * from.share);
+    const Rgb value = scattered * intensity(all, scene, vertex, -w) * (term * from.share);
     for (int c = 0; c < 3; ++c) group.sum[c][n] += value[c] * seen[c][n];
   }
 }

@@ -35,7 +35,7 @@ struct ShadowMapsView {
   /// `cosine`: of the way to the receiver's normal; 1 in a medium. An approximation: see ShadowMaps.
   VIRGA_HD bool visible(size_t light, Vec3 way, float distance, float cosine = 1) const {
     const float texel = 2 / static_cast<float>(resolution);
-    const float bias = std::min(kBias * texel / std::max(cosine, kLeastCosine), 0.5f);
+    const float bias = std::min(kBias * texel / std::fmax(cosine, kLeastCosine), 0.5f);
     return distance * (1 - bias) <= depth(light, way);
   }
 };

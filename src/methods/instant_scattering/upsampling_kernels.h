@@ -81,14 +81,50 @@ VIRGA_HD static inline void unveil(int count, float* __restrict light, const flo
   for (int i = 0; i < count; ++i) light[i] = through[i] > 1e-30f ? light[i] * own[i] / through[i] : 0.f;
 }
 
+/// How well each tap's features agree with each pixel's, times the spline.
+VIRGA_HD static inline void weighTaps(const UpsamplingBlock& block,
+                                      const UpsamplingTap* const taps[UpsamplingBlock::kTaps],
+                                      UpsamplingWeights& weights) {
+  for (int i = 0; i < UpsamplingBlock::kPixels; ++i) weights.surfaceSum[i] = weights.mediaSum[i] = 0;
+  for (int tap = 0; tap < UpsamplingBlock::kTaps; ++tap) {
+    weigh(block, *taps[tap], block.wx[tap % 4], block.wy[tap / 4], weights.surface[tap], weights.media[tap]);
+    addScaled(block.count, weights.surfaceSum, weights.surface[tap], 1);
+    addScaled(block.count, weights.mediaSum, weights.media[tap], 1);
+  }
+}
+
+/// The light of the taps in each pixel.
+VIRGA_HD static inline void spreadLight(const UpsamplingBlock& block,
+                                        const UpsamplingTap* const taps[UpsamplingBlock::kTaps],
+                                        const UpsamplingWeights& weights, UpsampledLight& light) {
+  light = {};
+  alignas(64) UpsamplingBlock::Lanes surfaceVeil[3] = {}, mediaVeil[3] = {};
+  for (int tap = 0; tap < UpsamplingBlock::kTaps; ++tap) {
+    const UpsamplingTap& t = *taps[tap];
+    for (int c = 0; c < 3; ++c) {
+      addScaled(block.count, surfaceVeil[c], weights.surface[tap], t.surfaceVeil[c]);
+      addScaled(block.count, mediaVeil[c], weights.media[tap], t.mediaVeil[c]);
+      for (int l = 0; l < 2; ++l) {
+        addScaled(block.count, light.surface[l][c], weights.surface[tap], t.surface[l][c]);
+        addScaled(block.count, light.media[l][c], weights.media[tap], t.media[l][c]);
+      }
+    }
+  }
+  for (int c = 0; c < 3; ++c)
+    for (int l = 0; l < 2; ++l) {
+      unveil(block.count, light.surface[l][c], block.surfaceVeil[c], surfaceVeil[c]);
+      unveil(block.count, light.media[l][c], block.mediaVeil[c], mediaVeil[c]);
+    }
+}
+
 }  // namespace kernels
 
 // --- to be called; defined in upsampling_kernels.cpp ---
 
-/// How well each tap's features agree with each pixel's, times the spline.
+/// kernels::weighTaps.
 void weighTaps(const UpsamplingBlock& block, const UpsamplingTap* const taps[UpsamplingBlock::kTaps],
                UpsamplingWeights& weights);
-/// The light of the taps in each pixel.
+/// kernels::spreadLight.
 void spreadLight(const UpsamplingBlock& block, const UpsamplingTap* const taps[UpsamplingBlock::kTaps],
                  const UpsamplingWeights& weights, UpsampledLight& light);
 
