@@ -260,7 +260,7 @@ class RenderJob {
 
   void write(const RenderSession& session, const Stopwatch& total, double cpuBefore) {
     warnOfNonFinite(session.film());
-    warnOfBlack(session.film());
+    warnOfBlack(session);
     const auto shield = interrupt_.shield();
     const Stopwatch watch;
     writePictures(report_.outputs, developed(session, report_, options_.layers ? WithLayers::yes : WithLayers::no));
@@ -295,8 +295,10 @@ class RenderJob {
     say("warning: {}\n", report_.warnings.back());
   }
 
-  void warnOfBlack(const Film& film) {
-    if (!isBlack(film.beauty())) return;
+  void warnOfBlack(const RenderSession& session) {
+    const SceneView& view = session.scene().view;
+    const bool shines = view.hasLamps() || view.emissive;  // what does not has been warned of
+    if (!shines || !isBlack(session.film().beauty())) return;
     report_.warnings.push_back(
         "every pixel is black: look at near_clip and far_clip, where the camera looks, the lights, the density of "
         "the medium, whether its grid lies inside its shape, and max_depth");

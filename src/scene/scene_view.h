@@ -61,6 +61,9 @@ struct SceneView {
   Vec3 cameraMediaPoint;       ///< a little beside the eye
   Bounds bounds;               ///< of all shapes
   float scale = 1;             ///< [unit] largest coordinate of the bounds
+
+  /// Has any emitter power? Media that glow do not count.
+  VIRGA_HD bool hasLamps() const { return emitters.size > 0 && emitterChoice.cdf[emitters.size] > 0; }
 };
 
 /// A bsdf with the colours that its textures have at uv.

@@ -67,7 +67,7 @@ WalkStarts::WalkStarts(const Scene& scene, const EmissionTarget& target)
 
 WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const SceneView& view = scene_.view;
-  if (view.emitters.size == 0 || !(view.emitterChoice.cdf[view.emitters.size] > 0)) return {};
+  if (!view.hasLamps()) return {};
   const auto choice = view.emitterChoice.sample(sampler.next1D());
   const EmitterView& emitter = view.emitters[choice.index];
   const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();

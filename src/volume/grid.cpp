@@ -240,6 +240,15 @@ RgbGrid::RgbGrid(int nx, int ny, int nz, std::vector<Rgb> values)
   checkBox(nx, ny, nz, 3, &values_.front().r).require();
 }
 
+RgbGrid RgbGrid::grey(int nx, int ny, int nz, const std::vector<float>& values) {
+  requireBox(nx, ny, nz, values.size());
+  checkBox(nx, ny, nz, 1, values.data()).require();  // a bad value counts once
+  std::vector<Rgb> colours;
+  colours.reserve(values.size());
+  for (const float value : values) colours.emplace_back(value);
+  return RgbGrid(nx, ny, nz, std::move(colours));
+}
+
 std::shared_ptr<const Grid> RgbGrid::largestChannel() const {
   std::vector<float> largest;
   largest.reserve(values_.size());

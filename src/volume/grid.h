@@ -58,6 +58,7 @@ class Grid {
 class RgbGrid {
  public:
   RgbGrid(int nx, int ny, int nz, std::vector<Rgb> values);
+  static RgbGrid grey(int nx, int ny, int nz, const std::vector<float>& values);
   RgbGridView view() const { return {values_.data(), nx_, ny_, nz_}; }
   float maximum() const;  ///< over voxels and channels
   /// The largest channel of each voxel: its interpolant bounds those of the channels.

@@ -131,13 +131,9 @@ RgbGrid loadRgbVol(const AlignedBytes& bytes) {
   const VolFile file = parseVol(bytes);
   if (file.channels != 1 && file.channels != 3)
     throw Error(fmt::format("has {} channels where 3 or 1 are wanted", file.channels));
+  if (file.channels == 1) return RgbGrid::grey(file.nx, file.ny, file.nz, floatsOf(file));
   std::vector<Rgb> colours(file.voxels());
-  if (file.channels == 3) {
-    std::memcpy(colours.data(), file.values, colours.size() * sizeof(Rgb));  // no third copy of what may be large
-  } else {
-    const std::vector<float> values = floatsOf(file);
-    std::transform(values.begin(), values.end(), colours.begin(), [](float value) { return Rgb(value); });
-  }
+  std::memcpy(colours.data(), file.values, colours.size() * sizeof(Rgb));  // no third copy of what may be large
   return RgbGrid(file.nx, file.ny, file.nz, std::move(colours));
 }
 

@@ -216,6 +216,40 @@ TEST(Equivalence, ScalingTheWorldChangesNothing) {
   expectAllSame(world(1), {world(1000), world(0.001)});
 }
 
+/// Uneven smoke on a grid over a ground, a lamp that has a table and a panel; turned, and larger by s.
+std::string smokyWorld(const std::string& turn, double s) {
+  const std::filesystem::path file = std::filesystem::path(::testing::TempDir()) / "uneven.vol";
+  DenseVolume volume;
+  volume.nx = volume.ny = volume.nz = 6;
+  for (int i = 0; i < 6 * 6 * 6; ++i) volume.values.push_back(static_cast<float>(i * 7 % 11) / 5);
+  writeVol(file, volume);
+  const std::string moved = turn + fmt::format(R"(<scale value="{}"/>)", s);
+  const auto shape = [&](const std::string& type, const std::string& place, const std::string& inside) {
+    return fmt::format(R"(<shape type="{}"><transform name="to_world">{}{}</transform>{}</shape>)", type, place, moved,
+                       inside);
+  };
+  const std::string medium = fmt::format(R"(<bsdf type="null"/><medium name="interior" type="heterogeneous">
+      <volume name="sigma_t" type="gridvolume"><string name="filename" value="uneven.vol"/>
+      <transform name="to_world"><scale value="2"/><translate value="-1, -1, -1"/>{}</transform></volume>
+      <float name="scale" value="{}"/>{}</medium>)",
+                                         moved, 2 / s, kPhase);
+  const std::string lamp = fmt::format(R"(<emitter type="spot"><transform name="to_world">
+      <lookat origin="-2, 3, 2" target="0, 0, 0" up="0, 1, 0"/>{}</transform><rgb name="intensity" value="{}"/></emitter>)",
+                                       moved, 60 * s * s);
+  const std::string clip =
+      fmt::format(R"(<float name="near_clip" value="{}"/><float name="far_clip" value="{}"/>)", 0.01 * s, 1e4 * s);
+  return sensor(clip, s, turn) + lamp +
+         shape("rectangle", R"(<scale value="4"/><rotate x="1" angle="-90"/><translate y="-1"/>)", "") +
+         shape("rectangle", R"(<scale value="0.7"/><rotate y="1" angle="-90"/><translate x="3"/>)",
+               R"(<emitter type="area"><rgb name="radiance" value="6"/></emitter>)") +
+         shape("cube", "", medium);
+}
+
+TEST(Equivalence, NorDoTheyWithSmokeOnAGridATableAndAPanel) {
+  const std::string turn = R"(<rotate x="0.3" y="0.8" z="-0.5" angle="77"/>)";
+  expectAllSame(smokyWorld("", 1), {smokyWorld(turn, 1), smokyWorld("", 1000), smokyWorld(turn, 0.001)});
+}
+
 TEST(Equivalence, EquiangularSamplingChangesNothing) {
   const std::string fog =
       homogeneous(0.5, "id=\"fog\"") + sensor(R"(<ref name="medium" id="fog"/>)") + kGround +

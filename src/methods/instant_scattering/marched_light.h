@@ -73,8 +73,7 @@ struct LampChoice {
 };
 /// By power.
 VIRGA_HD inline LampChoice chooseLamp(const SceneView& scene, float u) {
-  const int count = scene.emitters.size;
-  if (count == 0 || !(scene.emitterChoice.cdf[count] > 0)) return {0, 0};
+  if (!scene.hasLamps()) return {0, 0};
   const auto choice = scene.emitterChoice.sample(u);
   return {choice.index, choice.probability};
 }

@@ -194,9 +194,7 @@ class LightTechniques {
     return false;
   }
 
-  VIRGA_HD bool hasLights() const {
-    return lamps_ && scene_.emitters.size > 0 && scene_.emitterChoice.cdf[scene_.emitters.size] > 0;
-  }
+  VIRGA_HD bool hasLights() const { return lamps_ && scene_.hasLamps(); }
   /// At a vertex that is in the path's layers already.
   VIRGA_HD bool connectsHere(const Path& path) const { return hasLights() && (path.lightsX1 || path.layers.hasX2()); }
 
