@@ -48,11 +48,13 @@ def checked(*words):
 
 
 def _room():
-    checked("make", "smoke", "--resolution", 96, "--seed", 1, "-o", OUT / "ims-smoke.vdb")
+    volume, room = OUT / "ims-smoke.vdb", OUT / "ims-room.xml"
+    checked("make", "smoke", "--resolution", 96, "--seed", 1, "-o", volume)
     turns = [("", "white"), ('<rotate x="1" angle="90"/>', "white"), ('<rotate x="1" angle="-90"/>', "white"),
              ('<rotate y="1" angle="90"/>', "red"), ('<rotate y="1" angle="-90"/>', "green")]
-    room = OUT / "ims-room.xml"
-    room.write_text(ROOM.replace("{walls}", "".join(WALL.format(turn=t, bsdf=b) for t, b in turns)))
+    text = ROOM.replace("{walls}", "".join(WALL.format(turn=t, bsdf=b) for t, b in turns))
+    if not room.exists() or room.read_text() != text:  # its time says when pictures of it are stale
+        room.write_text(text)
     return room
 
 
@@ -88,11 +90,14 @@ class Scene:
 
     @functools.cache
     def paths(self, passes, seeds):
-        """Likewise by `path`."""
+        """Likewise by `path`; kept on disk while the program stays what it is."""
         found = []
         for seed in range(PATH_SEED, PATH_SEED + seeds):
-            self.render("path", "", passes, seed, [self.image])
-            found.append(exr_pixels.read(self.image))
+            image = OUT / f"ims-path-{self.name}-{self.size}-{passes}-{seed}.exr"
+            newest = max(file.stat().st_mtime for file in (VIRGA, self.file))
+            if not image.exists() or image.stat().st_mtime < newest:
+                self.render("path", "", passes, seed, [image])
+            found.append(exr_pixels.read(image))
         return np.array(found)
 
     def lights_of(self, walks):
