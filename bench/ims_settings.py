@@ -53,8 +53,6 @@ FAST = [
     ("every 8th pixel (default)", ""),
     ("every 16th pixel", "spacing=16"),
     ("16 steps of an eye ray", "eye_steps=16"),
-    ("lamps' tables of 24 nodes", "lamp_table=24"),
-    ("light from lamps marched", "lamp_table=0"),
 ]
 # Title, settings, passes.
 FRAMES = [
@@ -150,7 +148,7 @@ def compensations(scenes):
     return table(["approximation", "scene", "held against", "systematic relMSE", "bias"], rows) + """
 
 Held against the sampled compensation of the same seeds, but for the first two. Unclamped lights have no finite variance: a light at a distance d adds 1 / d^2, and of the lights
-one in 1 / d^3 is nearer, so that the error of a mean over n samples falls as n^-1/3 only. What is measured of them is whether their bias is below a percent; their systematic relMSE is not known any better
+a share of d^3 is nearer than that, so that the error of a mean over n samples falls as n^-1/3 only. What is measured of them is whether their bias is below a percent; their systematic relMSE is not known any better
 than its error says. They are no approximation: what compensates is put in place of lights only to be rid of that variance."""
 
 
@@ -186,8 +184,8 @@ def fast(scenes):
     rows = []
     for scene in scenes:
         for title, settings in FAST:
-            if scene.name == "hall" and ("steps" in settings or "table" in settings):
-                continue  # neither is used where fog is homogeneous
+            if scene.name == "hall" and "steps" in settings:
+                continue  # nothing is marched where fog is homogeneous
             pictures, _ = scene.pictures("mode=fast " + settings, 16, SEEDS)
             rows.append(shown([title, scene.name, *against_path(pictures, scene).cells()]))
     return table(["`mode=fast`", "scene", "systematic relMSE", "bias"], rows) + """
