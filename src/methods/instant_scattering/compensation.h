@@ -100,8 +100,9 @@ class Compensation {
     const NearbyNumbers numbers{sampler.random2D(), sampler.random(), sampler.random2D(), sampler.random()};
     const auto isFree = [&](Vec3 w, float t) { return gatherer_.isFree(known, at.vertex.p, w, t); };
     const auto seen = [&](MediaRay& r, float end, float localMean) {
-      const Rgb exact = passMedia(scene_, rays_, r, end, sampler.stream());
-      return options_.localMeanTransmittance && !isBlack(exact) ? Rgb(std::exp(-localMean * end)) : exact;
+      if (!options_.localMeanTransmittance) return passMedia(scene_, rays_, r, end, sampler.stream());
+      walkMedia(scene_, rays_, r, end, [](float, float) { return true; });  // for the media at its end
+      return Rgb(std::exp(-localMean * end));
     };
     return nearby.find(at.vertex, at.throughput, numbers, isFree, seen, next.vertex, next.throughput);
   }
