@@ -2,6 +2,7 @@
 #include "transport/defence.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "scene/scene_parts.h"
 
@@ -20,8 +21,8 @@ float meanDensity(const MediumView& medium) {
   return count > 0 ? static_cast<float>(sum / count) : 0;
 }
 
-/// Extents of the shapes that each medium fills [unit]; the scene's where that is not known.
-std::vector<float> extents(const Scene& scene) {
+/// Of the shapes that each medium fills; empty where that is not known.
+std::vector<Bounds> boundsOfEach(const Scene& scene) {
   std::vector<Bounds> bounds(static_cast<size_t>(scene.view.media.size));
   const auto extend = [&](const MediumTransition& media, const Bounds& shape) {
     if (media.interior != MediumTransition::kNone) bounds[static_cast<size_t>(media.interior)].extend(shape);
@@ -32,8 +33,13 @@ std::vector<float> extents(const Scene& scene) {
     extend(scene.parts->boundaries[i], scene.parts->boundaryShapes[i]->bounds);
   for (size_t i = 0; i < scene.parts->surfaces.size(); ++i)
     extend(scene.parts->surfaces[i].media, scene.parts->surfaceShapes[i]->bounds);
+  return bounds;
+}
+
+/// Extents of the shapes that each medium fills [unit]; the scene's where that is not known.
+std::vector<float> extents(const Scene& scene) {
   std::vector<float> result;
-  for (const Bounds& b : bounds) {
+  for (const Bounds& b : boundsOfEach(scene)) {
     const float across = b.empty() ? 0 : length(b.extent()), whole = length(scene.view.bounds.extent());
     result.push_back(across > 0 ? across : whole > 0 ? whole : scene.view.scale);
   }
@@ -96,6 +102,26 @@ bool outgrown(const std::vector<Rgb>& now, const std::vector<Rgb>& then) {
     for (int c = 0; c < 3; ++c)
       if (now[m][c] > kMostGrowth * then[m][c]) return true;
   return false;
+}
+
+float changeOfMedia(const Scene& before, const Scene& next) {
+  constexpr int kPoints = 16;  // in each direction
+  const std::vector<Bounds> bounds = boundsOfEach(next);
+  float change = 0;
+  for (size_t m = 0; m < bounds.size(); ++m) {
+    const MediumView &then = before.view.media[static_cast<int>(m)], &now = next.view.media[static_cast<int>(m)];
+    const Bounds& where = bounds[m].empty() ? next.view.bounds : bounds[m];
+    const auto place = [](int n) { return (static_cast<float>(n % kPoints) + 0.5f) / kPoints; };
+    double all = 0, changed = 0;
+    for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
+      const Vec3 p = where.lo + where.extent() * Vec3(place(i), place(i / kPoints), place(i / kPoints / kPoints));
+      const Rgb a = then.sigmaTAt(p), b = now.sigmaTAt(p);
+      for (int c = 0; c < 3; ++c)
+        all += static_cast<double>(a[c]), changed += static_cast<double>(std::fabs(a[c] - b[c]));
+    }
+    if (changed > 0) change = std::max(change, all > 0 ? static_cast<float>(std::min(1., changed / all)) : 1);
+  }
+  return change;
 }
 
 }  // namespace virga

@@ -24,4 +24,8 @@ Defence defenceOf(const Scene& scene, const std::vector<Rgb>& extinctions);
 /// be kept? It is the media that decide, not what the walks found: that would bias what they tell.
 bool outgrown(const std::vector<Rgb>& now, const std::vector<Rgb>& then);
 
+/// What share of the extinction has come or gone, in [0, 1], of the medium that changes most. Both scenes have the same
+/// media, in the same places.
+float changeOfMedia(const Scene& before, const Scene& next);
+
 }  // namespace virga

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "transport/media_walk.h"
+#include "transport/optical_depth.h"
 
 namespace virga {
 
@@ -19,21 +19,49 @@ struct DefensiveRates {
   CoarseGridView spread;  ///< local means of the density, of more cells than one; no values: none
 };
 
+/// Density of a flight if it was drawn from sigma_t itself, and if it was drawn defensively [1/unit], or both as
+/// probabilities to arrive.
+struct FlightDensity {
+  float own, wary;
+};
+
+/// Density of a walk's flights. Of all walks a part is drawn from sigma_t alone, flight by flight; the others are wary.
+/// How likely a walk is one of either kind changes with each flight that it is seen to take, and in a medium that has
+/// not changed its weight stays below 1 / kOwnWalks, however often it scatters.
+class WalkDensity {
+ public:
+  static constexpr float kOwnWalks = 0.5f;
+
+  /// Takes one more flight in: one over its density, given those before; 0 where that is too small to be told.
+  VIRGA_HD float inverse(const FlightDensity& flight) {
+    const float all = own_ * flight.own + wary_ * flight.wary;
+    if (!(all > 0)) return 0;
+    own_ *= flight.own / all, wary_ *= flight.wary / all;
+    return 1 / all;
+  }
+
+ private:
+  float own_ = kOwnWalks, wary_ = 1 - kOwnWalks;
+};
+
 /// Free flights whose density is known as a number and is positive wherever there may ever be a medium, so that what
 /// they find can be weighed again when the media change (docs/decisions/kept-walks.md). A mixture, chosen once for each
-/// flight: an exponential flight by the local mean of sigma_t, of one channel out of three; or by that mean as it is
-/// after spreading to the cells around, with a floor that is even throughout the shapes that the medium fills; or one
-/// in which the medium is even and thin.
+/// flight: one by sigma_t itself, of one channel out of three; or by its local mean as it is after spreading to the
+/// cells around, with a floor that is even throughout the shapes that the medium fills; or one in which the medium is
+/// even and thin.
 class DefensiveFlight {
  public:
-  static constexpr float kSpreadShare = 0.25f, kThinShare = 0.25f, kOwnShare = 1 - kSpreadShare - kThinShare;
+  static constexpr float kSpreadShare = 0.5f, kThinShare = 0.25f, kOwnShare = 1 - kSpreadShare - kThinShare;
+
+  enum class Walk { own, wary };  ///< own: of a walk whose flights are all drawn from sigma_t
 
   /// `rates` of the scene's media.
-  VIRGA_HD DefensiveFlight(const SceneView& scene, View<DefensiveRates> rates, Pcg32& random)
+  VIRGA_HD DefensiveFlight(const SceneView& scene, View<DefensiveRates> rates, Walk walk, Pcg32& random)
       : scene_(scene), rates_(rates) {
     const float choice = random.next();
     const int channel = std::min(2, static_cast<int>(3 * random.next()));
-    by_ = choice < kThinShare ? kThin : choice < kThinShare + kSpreadShare ? kSpread : channel;
+    by_ = channel;
+    if (walk == Walk::wary && choice < kThinShare + kSpreadShare) by_ = choice < kThinShare ? kThin : kSpread;
   }
 
   /// Goes on through [t0, t1] of the media of the state; pieces come in the order of the ray. piece(MediaPiece) for
@@ -49,35 +77,29 @@ class DefensiveFlight {
     const float end = std::min(t1, nearest.t);
     for (int i = 0; i < r.media.count(); ++i) {
       const int medium = r.media.medium(i);
-      const Densities here = pass(medium, r.ray, t0, end);
-      if (medium == nearest.medium) here_ = here;
+      const float spread = pass(medium, r.ray, t0, end);
+      if (medium == nearest.medium) own_ = scene_.media[medium].sigmaTAt(r.ray.at(end)), spread_ = spread;
       piece(MediaPiece{t0, end, medium});
     }
     return nearest;
   }
 
   /// How likely the flight was to come as far as it did.
-  VIRGA_HD float survival() const {
-    return kOwnShare * mean(exp(depth_ * -1.f)) + kSpreadShare * std::exp(-spreadDepth_) +
-           kThinShare * std::exp(-thinDepth_);
+  VIRGA_HD FlightDensity survival() const {
+    const float own = mean(exp(depth_ * -1.f));
+    return {own, kOwnShare * own + kSpreadShare * std::exp(-spreadDepth_) + kThinShare * std::exp(-thinDepth_)};
   }
-  /// Density with which it collides here [1/unit].
-  VIRGA_HD float collisionPdf(int medium) const {
+  /// Density with which it collides here.
+  VIRGA_HD FlightDensity collision(int medium) const {
     const DefensiveRates& r = rates_[medium];
-    const Rgb own = scene_.media[medium].spectrum * (scene_.media[medium].sigmaT * here_.own);
-    const float spread = r.evenRate + r.spreadRate * here_.spread;
-    return kOwnShare * mean(own * exp(depth_ * -1.f)) + kSpreadShare * spread * std::exp(-spreadDepth_) +
-           kThinShare * r.thinRate * std::exp(-thinDepth_);
+    const float own = mean(own_ * exp(depth_ * -1.f)), spread = r.evenRate + r.spreadRate * spread_;
+    return {own, kOwnShare * own + kSpreadShare * spread * std::exp(-spreadDepth_) +
+                     kThinShare * r.thinRate * std::exp(-thinDepth_)};
   }
 
  private:
   /// What is flown by, if not by a channel.
   static constexpr int kSpread = -1, kThin = -2;
-
-  /// Means of the density around a place.
-  struct Densities {
-    float own = 0, spread = 0;
-  };
 
   VIRGA_HD static float mean(Rgb c) { return (c.r + c.g + c.b) / 3; }
 
@@ -86,10 +108,6 @@ class DefensiveFlight {
   template <class Visit>
   VIRGA_HD static void forEachMean(const MediumView& medium, const CoarseGridView& cells, const Ray& ray, float t0,
                                    float t1, Visit&& visit) {
-    if (medium.homogeneous) {
-      visit(t0, t1, 1.f);
-      return;
-    }
     const GridRay g(medium, ray);
     forEachCoarseCell(medium.density, cells, g.o, g.d, t0, t1,
                       [&](float a, float b, float density, bool) { return !(a < b) || visit(a, b, density); });
@@ -112,8 +130,7 @@ class DefensiveFlight {
   VIRGA_HD float sample(int index, const Ray& ray, float t0, float t1, Pcg32& random) const {
     const MediumView& medium = scene_.media[index];
     const DefensiveRates& r = rates_[index];
-    if (by_ >= 0)
-      return sampleByMeans(medium, medium.density.mean, medium.sigmaT * medium.spectrum[by_], ray, t0, t1, random);
+    if (by_ >= 0) return distanceOfDepth(medium, by_, exponential(random), ray, t0, t1);
     const float rate = by_ == kThin ? r.thinRate : r.evenRate;
     const float even = rate > 0 ? t0 + exponential(random) / rate : kInfinity;
     if (by_ == kThin || !r.spread.values) return even;
@@ -132,28 +149,26 @@ class DefensiveFlight {
     return last < t1 ? 0 : density;
   }
 
-  /// Adds the optical depths of one medium; returns the means at the end.
-  VIRGA_HD Densities pass(int index, const Ray& ray, float t0, float t1) {
+  /// Adds the optical depths of one medium; returns the mean that is spread at the end.
+  VIRGA_HD float pass(int index, const Ray& ray, float t0, float t1) {
     const MediumView& medium = scene_.media[index];
     const DefensiveRates& r = rates_[index];
-    float own = 0, spread = 0;
-    Densities end;
-    end.own = sumMeans(medium, medium.density.mean, ray, t0, t1, own);
-    if (r.spread.values) end.spread = sumMeans(medium, r.spread, ray, t0, t1, spread);
-    for (int c = 0; c < 3; ++c)
-      if (medium.sigmaT * medium.spectrum[c] > 0) depth_[c] += medium.sigmaT * medium.spectrum[c] * own;
+    float spread = 0, here = 0;
+    if (r.spread.values) here = sumMeans(medium, r.spread, ray, t0, t1, spread);
+    depth_ += opticalDepth(medium, ray, t0, t1);
     if (r.evenRate > 0) spreadDepth_ += r.evenRate * (t1 - t0);
     if (spread > 0) spreadDepth_ += r.spreadRate * spread;
     thinDepth_ += r.thinRate * (t1 - t0);
-    return end;
+    return here;
   }
 
   const SceneView& scene_;
   View<DefensiveRates> rates_;
   int by_;     ///< a channel, kSpread or kThin
-  Rgb depth_;  ///< optical, by the local means
+  Rgb depth_;  ///< optical
   float spreadDepth_ = 0, thinDepth_ = 0;
-  Densities here_;  ///< where the flight collided
+  Rgb own_;           ///< sigma_t where the flight collided [1/unit]
+  float spread_ = 0;  ///< mean of the density there, spread
 };
 
 }  // namespace virga

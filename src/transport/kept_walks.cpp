@@ -29,6 +29,7 @@ class KeptWalker {
   void walk(const WalkStarts::Start& start, Sampler& sampler, KeptBlock& block) const {
     block.walks.push_back({start.flux, static_cast<uint32_t>(block.segments.size())});
     State state{start.at, start.flux};
+    if (sampler.random() < WalkDensity::kOwnWalks) state.kind = DefensiveFlight::Walk::own;
     while (!isBlack(state.expected) && step(state, sampler, block)) {
     }
   }
@@ -38,6 +39,8 @@ class KeptWalker {
     MediaRay at;
     Rgb expected;  ///< flux, as if each flight had been exact: for the choice whether the walk goes on
     int depth = 0;
+    DefensiveFlight::Walk kind = DefensiveFlight::Walk::wary;
+    WalkDensity density = {};
   };
 
   bool step(State& state, Sampler& sampler, KeptBlock& block) const {
@@ -45,7 +48,7 @@ class KeptWalker {
     const RayHit hit = rays_.nearest(state.at.ray, kInfinity);
     const size_t piecesBefore = block.pieces.size();
     MediaRay flown = state.at;
-    DefensiveFlight flight(scene_, rates_, sampler.stream());
+    DefensiveFlight flight(scene_, rates_, state.kind, sampler.stream());
     Collision collision;
     walkMedia(scene_, rays_, flown, hit.t, [&](float t0, float t1) {
       collision = flight.fly(flown, t0, t1, sampler.stream(), [&](const MediaPiece& p) { block.pieces.push_back(p); });
@@ -58,7 +61,8 @@ class KeptWalker {
     KeptSegment segment;
     segment.ray = state.at.ray, segment.length = collision.found() ? collision.t : hit.t;
     segment.medium = collision.medium, segment.firstPiece = static_cast<uint32_t>(piecesBefore);
-    segment.inverseDensity = 1 / (collision.found() ? flight.collisionPdf(collision.medium) : flight.survival());
+    segment.inverseDensity =
+        state.density.inverse(collision.found() ? flight.collision(collision.medium) : flight.survival());
     const bool goesOn = collision.found() ? scatterInMedium(state, segment, flown.media, sampler, block)
                                           : scatterOnSurface(state, segment, flown.media, hit, sampler, block);
     block.segments.push_back(segment);
@@ -235,8 +239,8 @@ bool keepsWalks(const Scene& next, const Change& change) {
 VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, const SampleId& id, int64_t frame,
                                 float retrace, const std::stop_token& stop) {
   const auto count = static_cast<size_t>((options.walks + kBlock - 1) / kBlock);
-  const bool isNew =
-      blocks_.size() != count || options.walks != options_.walks || options.maxDepth != options_.maxDepth;
+  const bool isNew = blocks_.size() != count || options.walks != options_.walks ||
+                     options.maxDepth != options_.maxDepth || options.aimed != options_.aimed;
   if (isNew) blocks_.assign(count, {}), options_ = options, next_ = 0;
   size_t due = 0;
   if (!isNew && frame != frame_)
@@ -250,7 +254,7 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
   const bool anyDue = std::any_of(blocks_.begin(), blocks_.end(), isDue);
   const Defence defence = anyDue ? defenceOf(scene, *extinctions) : Defence();
   const KeptWalker walker(scene, defence.rates, options.maxDepth);
-  const WalkStarts starts(scene);
+  const WalkStarts starts(scene, anyDue ? mediaTarget(scene, options.aimed) : EmissionTarget());
   std::vector<VirtualLights> parts(count);
   parallelFor(static_cast<int64_t>(count), 1, [&](int64_t b) {
     if (stop.stop_requested()) return;
@@ -265,16 +269,18 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
   return joined(parts);
 }
 
-void WalkStore::edit(const Scene& before, const Scene& next, const ChangeSet& changes) {
+bool WalkStore::edit(const Scene& before, const Scene& next, const ChangeSet& changes) {
   ++frame_;
   const bool kept = sameSpaces(before, next) && std::all_of(changes.changes.begin(), changes.changes.end(),
                                                             [&](const Change& c) { return keepsWalks(next, c); });
   if (!kept) passes_.clear();
+  change_ = kept && !passes_.empty() ? changeOfMedia(before, next) : 0;
+  return kept;
 }
 
 VirtualLights WalkStore::lights(const Scene& scene, const WalkOptions& options, const SampleId& id, int64_t pass,
                                 float retrace, const std::stop_token& stop) {
-  if (pass * options.walks > kMostWalks - options.walks) return traceVirtualLights(scene, options, id, stop);
+  if (!keeps(pass, options.walks)) return traceVirtualLights(scene, options, id, stop);
   return passes_[pass].lights(scene, options, id, frame_, retrace, stop);
 }
 

@@ -15,13 +15,12 @@ namespace virga {
 /// in the factors.
 struct KeptSegment {
   Ray ray;
-  float length = 0;         ///< [unit]
-  int medium = -1;          ///< that scatters at the end; -1: a surface does
-  uint32_t firstPiece = 0;  ///< of its pieces of media; the next segment's are behind them
-  float inverseDensity =
-      0;           ///< of the flight: one over its density [unit], or over the probability to reach the surface
-  int light = -1;  ///< which light of the block stands at the end, if any
-  Rgb onward;      ///< of the flux that goes on, survival included
+  float length = 0;          ///< [unit]
+  int medium = -1;           ///< that scatters at the end; -1: a surface does
+  uint32_t firstPiece = 0;   ///< of its pieces of media; the next segment's are behind them
+  float inverseDensity = 0;  ///< of the flight, given those before: over its density [unit] or its probability
+  int light = -1;            ///< which light of the block stands at the end, if any
+  Rgb onward;                ///< of the flux that goes on, survival included
 };
 
 /// Some walks, stored together.
@@ -61,8 +60,11 @@ class WalkStore {
  public:
   /// The scene is `next` from now on: forgets the walks if they could be other ones, or could not reach everything that
   /// is in it, and begins a new frame. Kept are walks where nothing changes but the camera, the film, and the grids,
-  /// places and coefficients of media.
-  void edit(const Scene& before, const Scene& next, const ChangeSet& changes);
+  /// places and coefficients of media. Says whether they are.
+  bool edit(const Scene& before, const Scene& next, const ChangeSet& changes);
+
+  /// What the last edit changed: see changeOfMedia(). 0 where no walks were kept.
+  float change() const { return change_; }
 
   /// As KeptWalks::lights. Passes beyond kMostWalks are not kept; their walks are traced by exact flights.
   VirtualLights lights(const Scene& scene, const WalkOptions& options, const SampleId& id, int64_t pass, float retrace,
@@ -70,10 +72,13 @@ class WalkStore {
 
   /// In all passes together: about 1 kB each.
   static constexpr int64_t kMostWalks = 1 << 18;
+  /// Are the walks of this pass among them?
+  static bool keeps(int64_t pass, int walks) { return (pass + 1) * walks <= kMostWalks; }
 
  private:
   std::map<int64_t, KeptWalks> passes_;
   int64_t frame_ = 0;
+  float change_ = 0;
 };
 
 }  // namespace virga

@@ -26,8 +26,26 @@ VIRGA_HD void forEachSmoothPiece(const GridView& grid, Vec3 o, Vec3 d, float t0,
   }
 }
 
-/// Optical depth of [t0, t1] in one medium, without an error but rounding: along a line a trilinear interpolant is
-/// piecewise cubic, and that is what two Gauss points integrate exactly.
+/// Density along a ray through a grid, between the planes of voxel centres.
+struct DensityAlong {
+  const MediumView& medium;
+  GridRay g;
+
+  VIRGA_HD DensityAlong(const MediumView& inMedium, const Ray& ray) : medium(inMedium), g(inMedium, ray) {}
+  VIRGA_HD Rgb at(float t) const {
+    const Vec3 p = g.o + g.d * t;
+    return medium.densityColors.values ? medium.densityColors.lookup(p) : Rgb(medium.density.lookupInside(p));
+  }
+  /// Integral over a piece: along a line a trilinear interpolant is piecewise cubic, and that is what two Gauss points
+  /// integrate exactly.
+  VIRGA_HD Rgb integral(float from, float to) const {
+    constexpr float kGauss = 0.57735027f;  // 1 / sqrt(3)
+    const float middle = 0.5f * (from + to), half = 0.5f * (to - from);
+    return (at(middle - kGauss * half) + at(middle + kGauss * half)) * half;
+  }
+};
+
+/// Optical depth of [t0, t1] in one medium, without an error but rounding.
 VIRGA_HD inline Rgb opticalDepth(const MediumView& medium, const Ray& ray, float t0, float t1) {
   if (!(medium.sigmaT > 0)) return {};
   Rgb depth;
@@ -36,22 +54,54 @@ VIRGA_HD inline Rgb opticalDepth(const MediumView& medium, const Ray& ray, float
       if (medium.spectrum[c] > 0) depth[c] = medium.spectrum[c] * medium.sigmaT * (t1 - t0);
     return depth;
   }
-  const GridRay g(medium, ray);
-  const auto density = [&](float t) {
-    const Vec3 p = g.o + g.d * t;
-    return medium.densityColors.values ? medium.densityColors.lookup(p) : Rgb(medium.density.lookupInside(p));
-  };
-  constexpr float kGauss = 0.57735027f;  // 1 / sqrt(3)
-  forEachMajorant(medium.density, g.o, g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
+  const DensityAlong density(medium, ray);
+  forEachMajorant(medium.density, density.g.o, density.g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
     if (!inside) depth += Rgb(majorant * (b - a));
     if (!inside || !(majorant > 0)) return true;
-    forEachSmoothPiece(medium.density, g.o, g.d, a, b, [&](float from, float to) {
-      const float middle = 0.5f * (from + to), half = 0.5f * (to - from);
-      depth += (density(middle - kGauss * half) + density(middle + kGauss * half)) * half;
-    });
+    forEachSmoothPiece(medium.density, density.g.o, density.g.d, a, b,
+                       [&](float from, float to) { depth += density.integral(from, to); });
     return true;
   });
   return depth * medium.spectrum * medium.sigmaT;
+}
+
+/// The other way round: where the optical depth of a channel from t0 on comes to `depth`; infinity if not before t1. It
+/// changes as little as the medium does, as tracking would not.
+VIRGA_HD inline float distanceOfDepth(const MediumView& medium, int channel, float depth, const Ray& ray, float t0,
+                                      float t1) {
+  const float sigmaT = medium.sigmaT * medium.spectrum[channel];
+  if (!(sigmaT > 0)) return kInfinity;
+  float left = depth / sigmaT, found = kInfinity;
+  const auto passEven = [&](float a, float b, float density) {
+    if (left < density * (b - a)) found = a + left / density;
+    left -= density > 0 ? density * (b - a) : 0;
+    return found == kInfinity;
+  };
+  if (medium.homogeneous) {
+    passEven(t0, t1, 1);
+    return found;
+  }
+  const DensityAlong density(medium, ray);
+  const auto passPiece = [&](float from, float to) {
+    if (found < kInfinity) return;
+    const float here = density.integral(from, to)[channel];
+    if (left < here) {
+      constexpr int kHalvings = 12;
+      float a = from, b = to;
+      for (int i = 0; i < kHalvings; ++i) {
+        const float middle = 0.5f * (a + b);
+        (density.integral(from, middle)[channel] > left ? b : a) = middle;
+      }
+      found = 0.5f * (a + b);
+    }
+    left -= here;
+  };
+  forEachMajorant(medium.density, density.g.o, density.g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
+    if (!inside) return passEven(a, b, majorant);
+    if (majorant > 0) forEachSmoothPiece(medium.density, density.g.o, density.g.d, a, b, passPiece);
+    return found == kInfinity;
+  });
+  return found;
 }
 
 /// Likewise, of all media along a ray; null boundaries are passed, surfaces are not looked at.

@@ -79,23 +79,17 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   return start;
 }
 
-namespace {
-
-/// The sphere around the media; none where one of them has no end. Wherever the camera is: it may move among the
-/// lights.
-EmissionTarget targetOf(const Scene& scene, float share) {
+EmissionTarget mediaTarget(const Scene& scene, float share) {
   if (!(share > 0) || endlessMedium(scene) != MediaState::kNone) return {};
   const Bounds media = boundsOfMedia(scene);
   const float radius = media.empty() ? 0 : 0.5f * length(media.extent());
   return radius > 0 ? EmissionTarget{media.center(), radius, share} : EmissionTarget{};
 }
 
-}  // namespace
-
 VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
                                  const std::stop_token& stop) {
   const int blocks = (options.walks + kBlock - 1) / kBlock;
-  const WalkStarts starts(scene, targetOf(scene, options.aimed));
+  const WalkStarts starts(scene, mediaTarget(scene, options.aimed));
   std::vector<VirtualLights> parts(static_cast<size_t>(blocks));
   parallelFor(blocks, 1, [&](int64_t b) {
     if (stop.stop_requested()) return;

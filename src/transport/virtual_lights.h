@@ -41,6 +41,10 @@ VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options,
 /// MediaState::kNone where there is none.
 int endlessMedium(const Scene& scene);
 
+/// The sphere around the media that a share of the walks is aimed at; none where a medium has no end. It does not
+/// depend on the camera, which may move among the lights.
+EmissionTarget mediaTarget(const Scene& scene, float share);
+
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
 class WalkStarts {
  public:

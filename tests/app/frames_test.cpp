@@ -134,21 +134,24 @@ TEST_F(Sequence, WalksAreKeptFromFrameToFrame) {
                   "<transform name=\"to_world\">" + (empty ? "" : still.substr(inner, last - inner)) + "</transform>");
   }
   scratch_.write("still.xml", still);
-  const auto film = [&](const char* name, const char* retrace) {
-    const Ended r = run({"render", "still.xml", "--frames", "1..3", "-m", "ims", "--set", "ims.walks=400", "--passes",
-                         "8", "--set", std::string("ims.retrace=") + retrace, "-o", std::string(name) + ".exr"});
+  const auto film = [&](const char* name, const std::string& retrace, const std::string& mode) {
+    const Ended r =
+        run({"render", "still.xml", "--frames", "1..3", "-m", "ims", "--set", "ims.walks=400", "--passes", "8", "--set",
+             "ims.retrace=" + retrace, "--set", "ims.mode=" + mode, "-o", std::string(name) + ".exr"});
     EXPECT_EQ(r.exitCode, 0) << r.err;
   };
-  film("kept", "0.25"), film("fresh", "1");
   const auto meanOf = [](const Image& image) {
     double sum = 0;
     for (const Rgb& pixel : image.pixels) sum += static_cast<double>(pixel.g);
     return sum / static_cast<double>(image.pixels.size());
   };
-  for (int frame = 1; frame <= 3; ++frame) {
-    const Image kept = picture(fileOfFrame("kept.exr", frame)), fresh = picture(fileOfFrame("fresh.exr", frame));
-    EXPECT_NEAR(meanOf(kept) / meanOf(fresh), 1, 0.1) << frame;
-    EXPECT_NE(kept.pixels, fresh.pixels) << "other walks";
+  for (const std::string mode : {"exact", "frame"}) {
+    film("kept", "0.25", mode), film("fresh", "1", mode);
+    for (int frame = 1; frame <= 3; ++frame) {
+      const Image kept = picture(fileOfFrame("kept.exr", frame)), fresh = picture(fileOfFrame("fresh.exr", frame));
+      EXPECT_NEAR(meanOf(kept) / meanOf(fresh), 1, 0.1) << mode << " " << frame;
+      EXPECT_NE(kept.pixels, fresh.pixels) << "other walks";
+    }
   }
 }
 

@@ -152,7 +152,10 @@ TEST(FrameLights, AllAtOnceIsStepByStep) {
                          R"(<ref name="medium" id="all"/></sensor>)");
   for (const std::string& elements : {plume(8), inFog}) {
     const SceneSnapshot scene = sceneOf(elements);
-    const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 1000}, {3, 0, 0, 0}), {.most = 100}, {});
+    FrameLights::Kept kept;
+    FrameLights::Options few;
+    few.most = 100;
+    const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 1000}, {3, 0, 0, 0}), few, kept, {});
     for (const EndKind kind : {EndKind::lambertian, EndKind::isotropic, EndKind::henyeyGreenstein}) {
       const std::vector<float> one = gathered(lights, kind, true), other = gathered(lights, kind, false);
       double error = 0, sum = 0;
@@ -167,8 +170,10 @@ TEST(FrameLights, AllAtOnceIsStepByStep) {
 // Tables of optical depths are near those that marching finds, from lights in the plume and on the floor.
 TEST(FrameLights, TablesKnowTheMedia) {
   const SceneSnapshot scene = sceneOf(plume(8));
-  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}),
-                           {.most = 200, .shadows = FrameLights::ShadowMapping::none}, {});
+  FrameLights::Kept kept;
+  FrameLights::Options few;
+  few.most = 200, few.shadows = FrameLights::ShadowMapping::none;
+  const FrameLights lights(*scene, traceVirtualLights(*scene, {.walks = 4000}, {3, 0, 0, 0}), few, kept, {});
   ASSERT_GT(lights.lights().size(), 100u);
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
   std::vector<float> x, y, z, none(64, 0.f), seen(64);

@@ -42,14 +42,14 @@ brute::Grid ballAt(double cx, double cy) {
 }
 
 /// `next` after `before` in one session, again and again: means of all layers.
-Estimates afterFrame(const SceneSnapshot& before, const SceneSnapshot& next, const std::string& retrace, int sets) {
+Estimates afterFrame(const SceneSnapshot& before, const SceneSnapshot& next, const SettingValues& settings, int sets) {
   Estimates result;
   for (int s = 0; s < sets; ++s) {
     RenderSession session = rendered(before, {.passes = Film::kReplicates,
                                               .seed = 5000 + static_cast<uint64_t>(s),
                                               .layers = LayerMask::all(),
                                               .method = "ims",
-                                              .settings = {{"walks", "256"}, {"lights", "4"}, {"retrace", retrace}}});
+                                              .settings = settings});
     session.nextFrame(next, differences(before->description, next->description));
     for (int i = 0; i < Film::kReplicates; ++i) session.step();
     result.nonFinite += session.film().nonFiniteSamples();
@@ -63,15 +63,18 @@ struct Case {
   SceneSnapshot before, next;
   std::string retrace = "0";
   std::vector<Power> powers = {};
+  SettingValues settings = {{"walks", "256"}, {"lights", "4"}};
 };
 
 void expectFramesAgree(const Case& c, int sets) {
-  const Estimates fresh = estimates(c.next, "ims", {{"walks", "256"}}, {.sets = sets, .seed = 3});
-  const Estimates kept = afterFrame(c.before, c.next, c.retrace, sets);
+  const Estimates fresh = estimates(c.next, "ims", c.settings, {.sets = sets, .seed = 3});
+  SettingValues keeping = c.settings;
+  keeping["retrace"] = c.retrace;
+  const Estimates kept = afterFrame(c.before, c.next, keeping, sets);
   expectSame(kept, fresh, c.name);
   expectPower(kept, fresh, c.powers, c.name);
   // As if nothing had been done about the change.
-  const Estimates stale = estimates(c.before, "ims", {{"walks", "256"}}, {.sets = sets, .seed = 4});
+  const Estimates stale = estimates(c.before, "ims", c.settings, {.sets = sets, .seed = 4});
   EXPECT_LT(differenceOf(stale, fresh, static_cast<size_t>(Layer::surfaceToSurface)).p, kDisagree) << c.name;
 }
 
@@ -86,7 +89,7 @@ TEST(ImsSequence, DensityThatChangesInPlace) {
 
 TEST(ImsSequence, SmokeThatMovesIntoEmptySpace) {
   const SceneSnapshot here = roomWith(ballAt(0.35, 0.4), 6, "here"), there = roomWith(ballAt(0.5, 0.5), 6, "there");
-  expectFramesAgree({"none traced anew", here, there, "0", kPowers}, 24);
+  expectFramesAgree({"none traced anew", here, there, "0", kPowers}, 40);
   expectFramesAgree({"half of them traced anew", here, there, "0.5", kPowers}, 24);
 }
 
@@ -98,6 +101,19 @@ TEST(ImsSequence, SmokeThatVanishes) {
                      "0",
                      {{Layer::surfaceToSurface, 0.03}}},
                     24);
+}
+
+// Frames keep walks, the choice of their lights and shadow maps. Their radius is given, lest the lights' spacing decide
+// it.
+const SettingValues kFrame = {
+    {"mode", "frame"}, {"walks", "2048"}, {"lights", "256"}, {"radius", "0.3"}, {"spacing", "4"}};
+
+TEST(ImsSequence, FramesOfDensityThatChangesInPlace) {
+  expectFramesAgree({"none", roomWith(plume(), 9, "a"), roomWith(plume(), 4, "b"), "0", kPowers, kFrame}, 6);
+}
+TEST(ImsSequence, FramesOfSmokeThatMovesIntoEmptySpace) {
+  const SceneSnapshot here = roomWith(ballAt(0.35, 0.4), 6, "here"), there = roomWith(ballAt(0.5, 0.5), 6, "there");
+  expectFramesAgree({"none traced anew", here, there, "0", kPowers, kFrame}, 8);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 
 #include "scene/scenes.h"
 #include "stats/stats.h"
+#include "transport/defence.h"
 #include "volume/volume_io.h"
 
 namespace virga {
@@ -151,6 +152,33 @@ TEST_F(KeptWalksTest, CarryWhatFreshOnesCarryWhateverTheMediaBecome) {
     if (c.before == cases[0].before) continue;
     EXPECT_LT(control.p, kDisagree) << c.what << ": the test cannot fail";
   }
+}
+
+TEST_F(KeptWalksTest, AimedOnesCarryTheSame) {
+  const SceneSnapshot before = room(left), after = room(stripes);
+  WalkOptions aimed = kWalks;
+  aimed.aimed = 0.5f;
+  const Moments fresh =
+      momentsOf(kSets, 31, [&](const SampleId& id) { return traceVirtualLights(*after, kWalks, id); });
+  const Moments kept = momentsOf(kSets, 32, [&](const SampleId& id) {
+    KeptWalks walks;
+    walks.lights(*before, aimed, id, 0, 0);
+    return walks.lights(*after, aimed, id, 1, 0);
+  });
+  const Verdict verdict = compared(kept, fresh);
+  EXPECT_GT(verdict.p, kDisagree);
+  EXPECT_LT(verdict.precision, 0.04);
+}
+
+TEST_F(KeptWalksTest, KnowHowMuchTheMediaChange) {
+  const SceneSnapshot before = room(stripes);
+  const auto changeTo = [&](const SceneSnapshot& next) { return changeOfMedia(*before, *next); };
+  EXPECT_EQ(changeTo(before), 0);
+  EXPECT_NEAR(changeTo(room([](Vec3 p) { return 1.01f * stripes(p); })), 0.01f, 1e-4f);
+  EXPECT_NEAR(changeTo(room(stripes, "0.3, 0.6, 1.3")), 0.1f / 2.1f, 1e-4f);
+  EXPECT_NEAR(changeTo(room(none)), 1, 1e-4f);
+  EXPECT_EQ(changeOfMedia(*room(none), *before), 1);
+  EXPECT_EQ(changeTo(room(stripes, "0.3, 0.6, 1.2", 0.5)), 0) << "an albedo is no extinction";
 }
 
 bool same(const VirtualLights& a, const VirtualLights& b) {

@@ -14,6 +14,9 @@ constexpr int kGroup = 64;
 /// Radius of a light that is spread, in spacings of the lights.
 constexpr float kRadiusSpacings = 2;
 
+/// By how much media may change while a walk is kept. Measured: docs/decisions/frame-sequences.md.
+constexpr float kMostChange = 0.05f;
+
 /// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
 template <class Body>
 void forEachBlock(const PassFrame& frame, const std::stop_token& stop, const Body& body) {
@@ -31,11 +34,11 @@ void forEachBlock(const PassFrame& frame, const std::stop_token& stop, const Bod
 class FramePass {
  public:
   FramePass(const Scene& scene, const FrameLights& lights, const FrameLamps& lamps, const ImsOptions& options,
-            uint64_t seed, uint32_t index)
+            const SampleId& id)
       : scene_(scene),
         options_(options),
-        id_{seed, 0, 0, index},
-        pixels_(scene, lights, lamps, options_, index),
+        id_(id),
+        pixels_(scene, lights, lamps, options_, id.index),
         paths_(scene, lights.virtualLights(), visibilityOfPaths(options), followed(options)) {}
 
   /// `features`: room for those of all pixels.
@@ -128,42 +131,49 @@ class FramePass {
 
 }  // namespace
 
-void FrameRenderer::forget(const ChangeSet& changes) {
+void FrameRenderer::forget(const ChangeSet& changes, bool walksStay) {
   if (!changes.cameraAlone()) lights_ = nullptr;
+  if (!walksStay) kept_.clear();
 }
 
-bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
+bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options, const SampleId& id, WalkStore& walks,
                                   const std::stop_token& stop) {
   const int around = endlessMedium(scene);
-  if (lights_ && lightsOf_ == index && around == around_) return true;
+  if (lights_ && lightsOf_ == id.index && around == around_) return true;
   lights_ = nullptr;
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
+  const WalkOptions walk{options.walks, maxDepth, options.flights, options.aim};
+  const bool keeps = options.retrace < 1 && WalkStore::keeps(id.index, options.walks);
+  const float asMuch = std::min(1.f, std::max(options.retrace, walks.change() / kMostChange));
+  const float part = options.retrace > 0 ? asMuch : 0;
   VirtualLights traced =
-      traceVirtualLights(scene, {options.walks, maxDepth, options.flights, options.aim}, {seed, 0, 0, index}, stop);
+      keeps ? walks.lights(scene, walk, id, id.index, part, stop) : traceVirtualLights(scene, walk, id, stop);
+  if (stop.stop_requested()) return false;
   FrameLights::Options kept;
   kept.most = options.frameLights;
-  kept.turn = FixedNumbers{index}.shift();
+  kept.turn = FixedNumbers{id.index}.shift();
   if (options.frame.visibility != ReceiverBatch::Visibility::maps) kept.shadows = FrameLights::ShadowMapping::none;
-  kept.resolution = options.visibility.resolution, kept.points = options.visibility.points;
-  auto lights = std::make_unique<FrameLights>(scene, std::move(traced), kept, stop);
-  auto lamps = std::make_unique<FrameLamps>(scene, FixedNumbers{index}, stop);
+  kept.maps = {options.visibility.resolution, options.visibility.points};
+  FrameLights::Kept none;
+  auto lights = std::make_unique<FrameLights>(scene, std::move(traced), kept, keeps ? kept_[id.index] : none, stop);
+  auto lamps = std::make_unique<FrameLamps>(scene, FixedNumbers{id.index}, stop);
   if (stop.stop_requested()) return false;
   lamps_ = std::move(lamps);
   lights_ = std::move(lights);
-  lightsOf_ = index, around_ = around;
+  lightsOf_ = id.index, around_ = around;
   return true;
 }
 
-bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, uint64_t seed, uint32_t index,
+bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, const SampleId& id, WalkStore& walks,
                          const std::stop_token& stop, PassFrame& frame) {
-  if (!prepareLights(scene, options, seed, index, stop)) return false;
+  if (!prepareLights(scene, options, id, walks, stop)) return false;
   ImsOptions own = options;
   const float spacing = lights_->spacing();  // none, if they all lie in a plane
   if (!(own.frame.near.bound > 0))
     own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
   const size_t pixels = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
   if (features_.size() != pixels) features_ = LargeArray<PixelFeatures>(pixels);
-  return FramePass(scene, *lights_, *lamps_, own, seed, index).run(stop, {features_.data(), pixels}, frame);
+  return FramePass(scene, *lights_, *lamps_, own, id).run(stop, {features_.data(), pixels}, frame);
 }
 
 }  // namespace virga

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <stop_token>
 #include <vector>
 
+#include "methods/instant_scattering/light_choice.h"
+#include "methods/instant_scattering/light_maps.h"
 #include "methods/instant_scattering/media_between.h"
 #include "transport/virtual_lights.h"
 
@@ -16,9 +19,13 @@ class FrameLights {
   struct Options {
     int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
     ShadowMapping shadows = ShadowMapping::maps;
-    int resolution = 32;  ///< of a map, texels in either direction
-    int points = 0;       ///< of the surfaces, in each map; 0: a ray for each texel
-    float turn = 0.5f;    ///< in [0, 1): which ones
+    LightMaps::Options maps;
+    float turn = 0.5f;  ///< in [0, 1): which ones
+  };
+  /// What the lights of a frame leave to those of the next one, if these are of the same walks among the same surfaces.
+  struct Kept {
+    LightChoice onSurfaces, inMedia;
+    std::shared_ptr<const LightMaps> maps;
   };
   struct Light {
     KernelLight kernel;
@@ -29,8 +36,9 @@ class FrameLights {
   };
 
   /// Of many lights few are kept, evenly in space and by their weight; all of these stand for as much light, and in
-  /// expectation they light as all would. A stop leaves lights out.
-  FrameLights(const Scene& scene, VirtualLights lights, const Options& options, const std::stop_token& stop);
+  /// expectation they light as all would. A stop leaves tables and maps undefined.
+  FrameLights(const Scene& scene, VirtualLights lights, const Options& options, Kept& kept,
+              const std::stop_token& stop);
   FrameLights(const FrameLights&) = delete;
   FrameLights& operator=(const FrameLights&) = delete;
 
@@ -50,15 +58,10 @@ class FrameLights {
   bool gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const;
 
  private:
-  KernelShadowMap mapOf(size_t i) const;
-  size_t texelsOfMap() const { return static_cast<size_t>(mapSide_) * static_cast<size_t>(mapSide_); }
-  void makeMaps(const Scene& scene, const Options& options, const std::stop_token& stop);
-
   VirtualLights virtualLights_;
   std::vector<Light> lights_;
   MediaBetween between_;
-  std::vector<float> maps_;  ///< shadow maps of the lights; empty: there are none
-  int mapSide_ = 0;          ///< texels of a map in either direction
+  std::shared_ptr<const LightMaps> maps_;  ///< null: there are none
 };
 
 /// How the kernels know a phase function, and its g; false if they do not.

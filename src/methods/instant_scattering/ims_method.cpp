@@ -19,11 +19,11 @@ class ImsMethod final : public Method {
 
   Reset update(SceneSnapshot next, const ChangeSet& changes) override {
     settings_.forScene(*next);
-    walks_.edit(*scene_, *next, changes);
+    const bool walksStay = walks_.edit(*scene_, *next, changes);
     scene_ = std::move(next);
     points_ = {};
     fast_.forget(changes);
-    frame_.forget(changes);
+    frame_.forget(changes, walksStay);
     return changes.empty() ? Reset::nothingLost : Reset::film;
   }
 
@@ -35,8 +35,8 @@ class ImsMethod final : public Method {
   PassResult pass(int64_t index, const Budget&, std::stop_token stop, PassFrame& frame) override {
     const ImsOptions options = settings_.forScene(*scene_);
     if (options.mode == ImsOptions::Mode::frame) {
-      const bool completed =
-          frame_.pass(*scene_, options, seed_ ^ kWalkSeed, static_cast<uint32_t>(index), stop, frame);
+      const SampleId id{seed_ ^ kWalkSeed, 0, 0, static_cast<uint32_t>(index)};
+      const bool completed = frame_.pass(*scene_, options, id, walks_, stop, frame);
       if (frame_.lights()) overlay_ = dotsOf(frame_.lights()->virtualLights());
       return {.completed = completed, .biased = true};
     }

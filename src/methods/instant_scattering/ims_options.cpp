@@ -127,11 +127,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
   if (o.aim > kMostAim)
     throw Error(fmt::format("--set ims.aim may be at most {}: some walks must go elsewhere", kMostAim));
   o.retrace = reader.share("retrace").value_or(o.retrace);
-  if (o.retrace < 1 && o.mode == ImsOptions::Mode::frame)
-    throw Error("--set ims.retrace needs ims.mode=exact or fast: a frame traces its walks when the scene changes");
   if (o.retrace < 1 && o.flights == FlightMode::marching)
     throw Error("--set ims.retrace needs ims.walk_flights=tracking: kept walks have flights of their own");
-  if (o.retrace < 1 && o.aim > 0) throw Error("--set ims.aim needs ims.retrace=1: kept walks are not aimed");
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;
