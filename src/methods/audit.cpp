@@ -153,7 +153,8 @@ std::optional<AuditResult> Audit::result() const {
 
 Audit::Truth pathTruth(const Scene& scene) {
   const PathOptions options{.maxDepth = scene.integrator.maxDepth, .rrDepth = scene.integrator.rrDepth};
-  const auto pixels = std::make_shared<PathPixels<EmbreeRays>>(scene, EmbreeRays{*scene.surfaceRays, *scene.boundaryRays}, options);
+  const auto pixels =
+      std::make_shared<PathPixels<EmbreeRays>>(scene, EmbreeRays{*scene.surfaceRays, *scene.boundaryRays}, options);
   return [pixels](int x, int y, const SampleId& id) { return pixels->sample(x, y, id).sum(); };
 }
 
