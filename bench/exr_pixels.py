@@ -53,8 +53,8 @@ def _unpacked(block, size):
     return lines
 
 
-def read(path):
-    """The beauty of a picture: an array (row, column, 3), linear."""
+def read(path, layer=""):
+    """A picture, or one of its layers: an array (row, column, 3), linear."""
     data = path.read_bytes()
     header, at = _header(data)
     if header["compression"][0] != ZIP:
@@ -70,4 +70,5 @@ def read(path):
         lines = _unpacked(data[at + 8:at + 8 + size], 4 * count * len(names) * width)
         pixels[first:first + count] = lines.view("<f4").reshape(count, len(names), width)
         at += 8 + size
-    return np.stack([pixels[:, names.index(c)] for c in "RGB"], axis=-1).astype(np.float64)
+    prefix = f"{layer}." if layer else ""
+    return np.stack([pixels[:, names.index(prefix + c)] for c in "RGB"], axis=-1).astype(np.float64)
