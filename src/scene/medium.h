@@ -39,6 +39,14 @@ struct MediumView {
     if (!densityColors.values) return spectrum * (sigmaT * density.lookup(q));
     return density.supports(q) ? spectrum * densityColors.lookup(q) * sigmaT : Rgb();
   }
+  /// Optical depth of a stretch: its length times the density on it, which may be without end [unit]. A channel that
+  /// the medium is clear in stays clear.
+  VIRGA_HD Rgb depthOf(Rgb length) const {
+    Rgb depth;
+    for (int c = 0; c < 3; ++c)
+      if (spectrum[c] > 0) depth[c] = spectrum[c] * sigmaT * length[c];
+    return depth;
+  }
   /// Mean of sigma_t over the channels and the cell of the downsampled grid that p lies in [1/unit].
   VIRGA_HD float localMeanSigmaT(Vec3 p) const {
     const float unit = sigmaT * (spectrum.r + spectrum.g + spectrum.b) / 3;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/parallel.h"
 #include "transport/defence.h"
@@ -212,15 +213,22 @@ bool sameSpaces(const Scene& a, const Scene& b) {
          same(a.view.surfaces, b.view.surfaces, [](const ShapeView& s) { return s.media; });
 }
 
-/// Directions were drawn from a phase function that may have been 0 where the next one is not.
-bool phasesMayChange(const Scene& scene, const Change& change) {
-  const NodePtr node = findNode(scene.description, change.objectId);
-  const bool blends = std::any_of(scene.view.media.begin(), scene.view.media.end(),
-                                  [](const MediumView& m) { return m.phaseBlends.size > 0; });
-  return !node || node->tag == "phase" || blends;
+/// Id of a medium's phase function, which may be a reference to any; empty where it has none of its own.
+std::string phaseOf(const Node& medium) {
+  for (const Property& p : medium.properties)
+    if (const auto* child = std::get_if<NodePtr>(&p.value); child && (*child)->tag == "phase") return (*child)->id;
+  return {};
 }
 
-bool keepsWalks(const Scene& next, const Change& change) {
+/// Directions were drawn from a phase function that may have been 0 where the next one is not.
+bool phasesMayChange(const Scene& before, const Scene& next, const Change& change) {
+  const NodePtr was = findNode(before.description, change.objectId), is = findNode(next.description, change.objectId);
+  const bool blends = std::any_of(next.view.media.begin(), next.view.media.end(),
+                                  [](const MediumView& m) { return m.phaseBlends.size > 0; });
+  return !was || !is || is->tag == "phase" || phaseOf(*was) != phaseOf(*is) || blends;
+}
+
+bool keepsWalks(const Scene& before, const Scene& next, const Change& change) {
   switch (change.aspect) {
     case Aspect::camera:
     case Aspect::film:
@@ -228,7 +236,7 @@ bool keepsWalks(const Scene& next, const Change& change) {
     case Aspect::mediumParameters:
     case Aspect::mediumGrid:
     case Aspect::mediumPose:
-      return !phasesMayChange(next, change);
+      return !phasesMayChange(before, next, change);
     default:
       return false;
   }
@@ -271,17 +279,21 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
 
 bool WalkStore::edit(const Scene& before, const Scene& next, const ChangeSet& changes) {
   ++frame_;
-  const bool kept = sameSpaces(before, next) && std::all_of(changes.changes.begin(), changes.changes.end(),
-                                                            [&](const Change& c) { return keepsWalks(next, c); });
+  const bool kept =
+      sameSpaces(before, next) && std::all_of(changes.changes.begin(), changes.changes.end(),
+                                              [&](const Change& c) { return keepsWalks(before, next, c); });
   if (!kept) passes_.clear();
-  change_ = kept && !passes_.empty() ? changeOfMedia(before, next) : 0;
+  const float since = std::exchange(asked_, false) ? 0 : change_;
+  change_ = kept && !passes_.empty() ? since + changeOfMedia(before, next) : 0;
   return kept;
 }
 
 VirtualLights WalkStore::lights(const Scene& scene, const WalkOptions& options, const SampleId& id, int64_t pass,
                                 float retrace, const std::stop_token& stop) {
   if (!keeps(pass, options.walks)) return traceVirtualLights(scene, options, id, stop);
-  return passes_[pass].lights(scene, options, id, frame_, retrace, stop);
+  asked_ = true;
+  const float part = retrace > 0 ? std::min(1.f, std::max(retrace, change_ / kMostChange)) : 0;
+  return passes_[pass].lights(scene, options, id, frame_, part, stop);
 }
 
 }  // namespace virga

@@ -63,13 +63,14 @@ class WalkStore {
   /// places and coefficients of media. Says whether they are.
   bool edit(const Scene& before, const Scene& next, const ChangeSet& changes);
 
-  /// What the last edit changed: see changeOfMedia(). 0 where no walks were kept.
-  float change() const { return change_; }
-
-  /// As KeptWalks::lights. Passes beyond kMostWalks are not kept; their walks are traced by exact flights.
+  /// As KeptWalks::lights, but for a `retrace` above 0: the more the media have changed, the more walks are traced
+  /// anew, all where that is kMostChange. Passes beyond kMostWalks are not kept; their walks are traced by exact
+  /// flights.
   VirtualLights lights(const Scene& scene, const WalkOptions& options, const SampleId& id, int64_t pass, float retrace,
                        const std::stop_token& stop = {});
 
+  /// By how much media may change while a walk is kept. Measured: docs/decisions/frame-sequences.md.
+  static constexpr float kMostChange = 0.05f;
   /// In all passes together: about 1 kB each.
   static constexpr int64_t kMostWalks = 1 << 18;
   /// Are the walks of this pass among them?
@@ -78,7 +79,8 @@ class WalkStore {
  private:
   std::map<int64_t, KeptWalks> passes_;
   int64_t frame_ = 0;
-  float change_ = 0;
+  float change_ = 0;    ///< by the edits since walks were last asked for: see changeOfMedia()
+  bool asked_ = false;  ///< for the walks of this frame
 };
 
 }  // namespace virga

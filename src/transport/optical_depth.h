@@ -48,12 +48,8 @@ struct DensityAlong {
 /// Optical depth of [t0, t1] in one medium, without an error but rounding.
 VIRGA_HD inline Rgb opticalDepth(const MediumView& medium, const Ray& ray, float t0, float t1) {
   if (!(medium.sigmaT > 0)) return {};
+  if (medium.homogeneous) return medium.depthOf(Rgb(t1 - t0));
   Rgb depth;
-  if (medium.homogeneous) {
-    for (int c = 0; c < 3; ++c)
-      if (medium.spectrum[c] > 0) depth[c] = medium.spectrum[c] * medium.sigmaT * (t1 - t0);
-    return depth;
-  }
   const DensityAlong density(medium, ray);
   forEachMajorant(medium.density, density.g.o, density.g.d, t0, t1, [&](float a, float b, float majorant, bool inside) {
     if (!inside) depth += Rgb(majorant * (b - a));
@@ -62,7 +58,7 @@ VIRGA_HD inline Rgb opticalDepth(const MediumView& medium, const Ray& ray, float
                        [&](float from, float to) { depth += density.integral(from, to); });
     return true;
   });
-  return depth * medium.spectrum * medium.sigmaT;
+  return medium.depthOf(depth);
 }
 
 /// The other way round: where the optical depth of a channel from t0 on comes to `depth`; infinity if not before t1. It

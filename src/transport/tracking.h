@@ -214,8 +214,7 @@ inline constexpr float kTransmittanceRoulette = 0.1f;
 VIRGA_HD inline Rgb estimateTransmittance(const MediumView& medium, const Ray& ray, float t0, float t1, Pcg32& random) {
   if (!(medium.sigmaT > 0)) return Rgb(1.f);
   if (medium.homogeneous) {
-    const float depth = medium.sigmaT * (t1 - t0);
-    return medium.grey ? Rgb(std::exp(-depth)) : exp(medium.spectrum * -depth);
+    return medium.grey ? Rgb(std::exp(-medium.sigmaT * (t1 - t0))) : exp(medium.depthOf(Rgb(t1 - t0)) * -1.f);
   }
   Rgb transmittance(1.f);
   const auto visit = [&](const TentativeCollision& c) {

@@ -115,6 +115,17 @@ TEST(Spectral, ChannelsAHundredfoldApart) {
 TEST(Spectral, AChannelWithoutExtinction) {
   expectChannelsAlone([](int c) { return std::string(kCamera) + kLamp + kGround + box(homogeneous({0, 3, 1}, c)); });
 }
+// Without end: the sky is seen, and lights the ground, in the one channel that it is clear in.
+TEST(Spectral, FogWithoutEndThatIsClearInOneChannel) {
+  const std::string camera(kCamera), open = camera.substr(0, camera.rfind("</sensor>"));
+  const auto fog = [](int c) {
+    return fmt::format(
+        R"(<medium type="homogeneous"><rgb name="sigma_t" value="{}"/><rgb name="albedo" value="{}"/></medium>)",
+        colour({0, 0.3, 0.1}, c), colour({0.9, 0.5, 0.4}, c));
+  };
+  const std::string sky = R"(<emitter type="constant"><rgb name="radiance" value="0.5, 0.7, 1"/></emitter>)";
+  expectChannelsAlone([&](int c) { return open + fog(c) + "</sensor>" + sky + kLamp + kGround; });
+}
 TEST(Spectral, EquiangularSampling) {
   expectChannelsAlone(
       [](int c) {

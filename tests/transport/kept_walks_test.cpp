@@ -253,5 +253,21 @@ TEST_F(KeptWalksTest, AreForgottenWhereMoreThanMediaChanges) {
   EXPECT_FALSE(isKept({{{"nobody", Aspect::mediumGrid}}}));
 }
 
+TEST_F(KeptWalksTest, AreForgottenWhereAMediumNamesAnotherPhaseFunction) {
+  const auto fog = [](const std::string& phase, double sigmaT) {
+    const std::string medium = R"(<shape type="sphere"><bsdf type="null"/><medium name="interior" type="homogeneous">
+      <float name="sigma_t" value="{}"/><ref name="phase" id="{}"/></medium></shape>)";
+    return test::build(R"(<phase type="isotropic" id="even"/><phase type="hg" id="forward"><float name="g" value="0.9"/>
+      </phase><emitter type="point"/>)" +
+                       fmt::format(fmt::runtime(medium), sigmaT, phase) + fmt::format(fmt::runtime(medium), 1, "even") +
+                       fmt::format(fmt::runtime(medium), 1, "forward"));
+  };
+  const auto isKept = [](const SceneSnapshot& before, const SceneSnapshot& after) {
+    return WalkStore().edit(*before, *after, differences(before->description, after->description));
+  };
+  EXPECT_TRUE(isKept(fog("even", 2), fog("even", 3)));
+  EXPECT_FALSE(isKept(fog("even", 2), fog("forward", 2)));
+}
+
 }  // namespace
 }  // namespace virga

@@ -14,9 +14,6 @@ constexpr int kGroup = 64;
 /// Radius of a light that is spread, in spacings of the lights.
 constexpr float kRadiusSpacings = 2;
 
-/// By how much media may change while a walk is kept. Measured: docs/decisions/frame-sequences.md.
-constexpr float kMostChange = 0.05f;
-
 /// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
 template <class Body>
 void forEachBlock(const PassFrame& frame, const std::stop_token& stop, const Body& body) {
@@ -144,10 +141,8 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
   const WalkOptions walk{options.walks, maxDepth, options.flights, options.aim};
   const bool keeps = options.retrace < 1 && WalkStore::keeps(id.index, options.walks);
-  const float asMuch = std::min(1.f, std::max(options.retrace, walks.change() / kMostChange));
-  const float part = options.retrace > 0 ? asMuch : 0;
   VirtualLights traced =
-      keeps ? walks.lights(scene, walk, id, id.index, part, stop) : traceVirtualLights(scene, walk, id, stop);
+      keeps ? walks.lights(scene, walk, id, id.index, options.retrace, stop) : traceVirtualLights(scene, walk, id, stop);
   if (stop.stop_requested()) return false;
   FrameLights::Options kept;
   kept.most = options.frameLights;

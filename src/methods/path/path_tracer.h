@@ -222,6 +222,7 @@ class PathTracer {
   }
 
   VIRGA_HD bool survives(Path& path, Sampler& sampler) const {
+    if (isBlack(path.throughput)) return false;  // too little to be told from nothing
     // Where guides make the throughput small the light that follows is bright.
     const float promise = path.promise * std::exchange(path.before, path.promise);
     if (path.depth < options_.rrDepth) return true;
