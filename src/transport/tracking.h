@@ -215,7 +215,11 @@ VIRGA_HD inline Rgb estimateTransmittance(const MediumView& medium, const Ray& r
   if (!(medium.sigmaT > 0)) return Rgb(1.f);
   if (medium.homogeneous) {
     const float depth = medium.sigmaT * (t1 - t0);
-    return medium.grey ? Rgb(std::exp(-depth)) : exp(medium.spectrum * -depth);
+    if (medium.grey) return Rgb(std::exp(-depth));
+    Rgb transmittance(1.f);
+    for (int c = 0; c < 3; ++c)  // the depth may be infinite
+      if (medium.spectrum[c] > 0) transmittance[c] = std::exp(medium.spectrum[c] * -depth);
+    return transmittance;
   }
   Rgb transmittance(1.f);
   const auto visit = [&](const TentativeCollision& c) {
