@@ -25,11 +25,12 @@ VIRGA_HD inline bool chooseTarget(const EmissionTarget& target, float& u) {
   return aimed;
 }
 
-/// Lights at infinity send their rays through a disk that hides the whole scene, or through the target.
-VIRGA_HD inline EmittedRay fromInfinity(const SceneView& scene, Vec3 travel, Rgb irradiance, Vec2 u,
+/// Lights at infinity send their rays through a disk that hides all of `reach`, from outside of it, or through the
+/// target.
+VIRGA_HD inline EmittedRay fromInfinity(const Bounds& reach, Vec3 travel, Rgb irradiance, Vec2 u,
                                         const EmissionTarget& target) {
-  const Vec3 center = scene.bounds.center();
-  const float radius = 0.5f * length(scene.bounds.extent()) * (1 + 1e-3f);
+  const Vec3 center = reach.center();
+  const float radius = 0.5f * length(reach.extent()) * (1 + 1e-3f);
   const bool aimed = chooseTarget(target, u.x);
   const Vec2 d = uniformDisk(u);
   const Frame frame(travel);
@@ -100,16 +101,16 @@ VIRGA_HD inline EmittedRay sampleDirection(const EmitterView& emitter, const Emi
   return {{place.p, w}, place.flux(emitter, w) * (own / mixture)};
 }
 
-/// Samples where and whither `emitter` sends light; the choice of the emitter is not counted. Black where a ray was
-/// aimed at the target from where no light goes to it.
-VIRGA_HD inline EmittedRay sampleEmittedRay(const SceneView& scene, const EmitterView& emitter, Vec2 uPosition,
-                                            Vec2 uDirection, const EmissionTarget& target = {}) {
+/// Samples where and whither `emitter` sends light; the choice of the emitter is not counted. `reach`: all that light
+/// from infinity is to meet. Black where a ray was aimed at the target from where no light goes to it.
+VIRGA_HD inline EmittedRay sampleEmittedRay(const SceneView& scene, const EmitterView& emitter, const Bounds& reach,
+                                            Vec2 uPosition, Vec2 uDirection, const EmissionTarget& target = {}) {
   if (!emitter.infinite())
     return sampleDirection(emitter, sampleEmissionPlace(scene, emitter, uPosition), uDirection, target);
   if (emitter.kind == EmitterView::Kind::directional)
-    return fromInfinity(scene, emitter.direction, emitter.value, uPosition, target);
+    return fromInfinity(reach, emitter.direction, emitter.value, uPosition, target);
   const LightSample s = sampleLight(scene, emitter, scene.bounds.center(), uDirection);
-  return s.pdf > 0 ? fromInfinity(scene, -s.wi, s.radiance / s.pdf, uPosition, target) : EmittedRay{};
+  return s.pdf > 0 ? fromInfinity(reach, -s.wi, s.radiance / s.pdf, uPosition, target) : EmittedRay{};
 }
 
 }  // namespace virga

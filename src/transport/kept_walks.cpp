@@ -208,7 +208,7 @@ bool sameSpaces(const Scene& a, const Scene& b) {
     return std::equal(x.begin(), x.end(), y.begin(), y.end(),
                       [&](const auto& p, const auto& q) { return sameBoundary(mediaOf(p), mediaOf(q)); });
   };
-  return a.view.media.size == b.view.media.size && WalkStarts(a).endless() == WalkStarts(b).endless() &&
+  return a.view.media.size == b.view.media.size && WalkStarts(a).serve(WalkStarts(b)) &&
          same(a.view.boundaries, b.view.boundaries, [](const MediumTransition& m) { return m; }) &&
          same(a.view.surfaces, b.view.surfaces, [](const ShapeView& s) { return s.media; });
 }

@@ -12,10 +12,6 @@ namespace {
 /// A wider square of directions would waste its corners: all around is better.
 constexpr float kMostReach = 1.5f;
 
-bool isBounded(const MediumView& medium) {
-  return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
-}
-
 /// What the cells of a grid fill that are not empty, in the world.
 void extendByGrid(const MediumView& medium, Bounds& bounds) {
   const CoarseGridView& cells = medium.density.majorant;
@@ -28,9 +24,7 @@ void extendByGrid(const MediumView& medium, Bounds& bounds) {
             cells.origin + Vec3(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) * cells.cellSize;
         filled.extend(lo), filled.extend(lo + cells.cellSize);
       }
-  if (filled.empty()) return;
-  const Affine toWorld = medium.worldToDensity.inverse();
-  for (int i = 0; i < 8; ++i) bounds.extend(toWorld.point(filled.corner(i)));
+  if (!filled.empty()) bounds.extend(boundsInWorld(medium, filled));
 }
 
 bool isPointLike(const EmitterView& e) {
@@ -126,7 +120,7 @@ int lampTableSide(const SceneView& scene) {
   constexpr int kFew = 32, kMany = 256;
   constexpr size_t kMostByDefault = 128 << 20;
   const int lamps = lampsOf(scene);
-  const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), isBounded);
+  const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), endsByItself);
   if (lamps == 0 || lamps > LampTables::kMostLamps || scene.media.size == 0 || !bounded) return 0;
   float voxels = 0;
   for (const MediumView& medium : scene.media)

@@ -34,6 +34,17 @@ Bounds whereMediaMayBe(const Scene& scene) {
 
 }  // namespace
 
+bool endsByItself(const MediumView& medium) {
+  return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
+}
+
+Bounds boundsInWorld(const MediumView& medium, const Bounds& inGrid) {
+  const Affine toWorld = medium.worldToDensity.inverse();
+  Bounds bounds;
+  for (int i = 0; i < 8; ++i) bounds.extend(toWorld.point(inGrid.corner(i)));
+  return bounds;
+}
+
 bool mediaAreBounded(const Scene& scene) {
   const SceneView& view = scene.view;
   return view.cameraMedia.base() == MediaState::kNone &&

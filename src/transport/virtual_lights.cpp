@@ -62,8 +62,55 @@ VirtualLights joined(const std::vector<VirtualLights>& parts) {
   return all;
 }
 
+namespace {
+
+bool isLitFromInfinity(const SceneView& scene) {
+  return std::any_of(scene.emitters.begin(), scene.emitters.end(), [](const EmitterView& e) { return e.infinite(); });
+}
+
+/// Density where a grid's values end, and from there on.
+float densityFarAway(const MediumView& medium) { return medium.homogeneous ? 1 : medium.density.background; }
+
+/// What of light from infinity gets to where walks start, in a medium that has no end there: 1 or 0 for each channel.
+Rgb transmittanceFromInfinity(const MediumView& medium) {
+  Rgb through;
+  for (int c = 0; c < 3; ++c) through[c] = medium.sigmaT * medium.spectrum[c] * densityFarAway(medium) > 0 ? 0 : 1;
+  return through;
+}
+Rgb transmittanceFromInfinity(const SceneView& scene, const MediaState& media) {
+  Rgb through(1.f);
+  for (int i = 0; i < media.count(); ++i) through *= transmittanceFromInfinity(scene.media[media.medium(i)]);
+  return through;
+}
+
+/// All shapes, and the values of a grid that is around them: where it is 0 far away, light from infinity meets them.
+Bounds reachFromInfinity(const SceneView& scene, int endless) {
+  Bounds reach = scene.bounds;
+  if (endless == MediaState::kNone || !isLitFromInfinity(scene)) return reach;
+  const MediumView& medium = scene.media[endless];
+  if (endsByItself(medium)) reach.extend(boundsInWorld(medium, {medium.density.supportLo, medium.density.supportHi}));
+  return reach;
+}
+
+bool contains(const Bounds& outer, Bounds inner) {
+  inner.extend(outer);
+  return inner == outer;
+}
+
+}  // namespace
+
 WalkStarts::WalkStarts(const Scene& scene, const EmissionTarget& target)
-    : scene_(scene), target_(target), endless_(endlessMedium(scene)) {}
+    : scene_(scene), target_(target), endless_(endlessMedium(scene)), reach_(reachFromInfinity(scene.view, endless_)) {}
+
+bool WalkStarts::serve(const WalkStarts& next) const {
+  if (endless_ != next.endless_ || !contains(reach_, next.reach_)) return false;
+  const auto sameThrough = [](const MediumView& a, const MediumView& b) {
+    return transmittanceFromInfinity(a) == transmittanceFromInfinity(b);
+  };
+  const View<MediumView>&media = scene_.view.media, &others = next.scene_.view.media;
+  return !isLitFromInfinity(scene_.view) ||
+         std::equal(media.begin(), media.end(), others.begin(), others.end(), sameThrough);
+}
 
 WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const SceneView& view = scene_.view;
@@ -71,11 +118,10 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const auto choice = view.emitterChoice.sample(sampler.next1D());
   const EmitterView& emitter = view.emitters[choice.index];
   const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();
-  const EmittedRay emitted = sampleEmittedRay(view, emitter, uPosition, uDirection, target_);
+  const EmittedRay emitted = sampleEmittedRay(view, emitter, reach_, uPosition, uDirection, target_);
   if (isBlack(emitted.flux)) return {};
-  const Start start{{emitted.ray, mediaAt(scene_, emitted.ray.o, endless_), 0}, emitted.flux / choice.probability};
-  // Light from infinity does not get through fog that has no end.
-  if (emitter.infinite() && !start.at.media.vacuum()) return {};
+  Start start{{emitted.ray, mediaAt(scene_, emitted.ray.o, endless_), 0}, emitted.flux / choice.probability};
+  if (emitter.infinite()) start.flux *= transmittanceFromInfinity(view, start.at.media);
   return start;
 }
 

@@ -46,6 +46,9 @@ int endlessMedium(const Scene& scene);
 EmissionTarget mediaTarget(const Scene& scene, float share);
 
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
+///
+/// Media without end let all light from infinity through or none, channel by channel. Where a grid is around everything
+/// walks start outside of its values, though these may lie beyond all shapes.
 class WalkStarts {
  public:
   /// `target`: where some of the walks are aimed.
@@ -56,13 +59,14 @@ class WalkStarts {
     Rgb flux;  ///< [W]; black if no walk leaves
   };
   Start sample(Sampler& sampler) const;
-  /// The medium that is around everything, or MediaState::kNone.
-  int endless() const { return endless_; }
+  /// Would walks that have started here be walks of `next`, too, which has the same emitters and shapes?
+  bool serve(const WalkStarts& next) const;
 
  private:
   const Scene& scene_;
   EmissionTarget target_;
   int endless_;
+  Bounds reach_;  ///< all that light from infinity is to meet
 };
 
 }  // namespace virga

@@ -12,12 +12,12 @@
 namespace virga::testing {
 namespace {
 
-std::string sensor(int size, float x) {
+std::string sensor(int size, float x, const char* medium = "") {
   return fmt::format(R"(<sensor type="perspective"><float name="fov" value="40"/>
     <transform name="to_world"><lookat origin="{1}, 0.3, 5" target="{1}, -0.1, 0" up="0, 1, 0"/></transform>
     <film type="hdrfilm"><integer name="width" value="{0}"/><integer name="height" value="{0}"/><rfilter type="box"/></film>
-    </sensor>)",
-                     size, x);
+    {2}</sensor>)",
+                     size, x, medium);
 }
 
 /// A volume on disk for as long as the tests run.
@@ -62,6 +62,14 @@ std::string endlessPlume(int size, double z) {
          kPlumeLamp +
          R"(<shape type="cube"><transform name="to_world"><scale value="0.2"/></transform><bsdf type="null"/>
     <ref name="interior" id="smoke"/></shape>)";
+}
+
+std::string openPlume(int size, const std::string& lights) {
+  return smoke(R"(id="smoke")") + sensor(size, 0, R"(<ref name="medium" id="smoke"/>)") + lights + R"(
+    <shape type="rectangle"><transform name="to_world"><scale value="0.8"/><rotate x="1" angle="-90"/><translate y="-0.7"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.7, 0.6"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.6"/><translate z="-0.7"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.7, 0.8"/></bsdf></shape>)";
 }
 
 std::string fog(int size, const std::string& bsdf, float x) {

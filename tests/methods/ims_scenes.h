@@ -14,6 +14,9 @@ std::string plume(int size, float x = 0);
 /// everything unless the camera is in the cube. Without floor and block.
 std::string endlessPlume(int size, double z);
 
+/// The smoke around everything, with a floor and a wall that reach less far than it does.
+std::string openPlume(int size, const std::string& lights);
+
 /// Fog in a room with a lamp on the ceiling and a ball of `bsdf`.
 std::string fog(int size, const std::string& bsdf = R"(<bsdf type="diffuse"/>)", float x = 0);
 

@@ -114,7 +114,7 @@ class Emission {
       : scene_(test::build(light.elements + kPatch)), target_(target) {}
   EmittedRay ray(Pcg32& random) const {
     const Vec2 position{random.next(), random.next()}, direction{random.next(), random.next()};
-    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], position, direction, target_);
+    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], scene_->view.bounds, position, direction, target_);
   }
   const SceneView& view() const { return scene_->view; }
 
@@ -256,7 +256,9 @@ double directionP(const Light& light, Vec3 axis, const std::function<double(Vec3
   return stats::chiSquared(
       {.axis = axis, .samples = 100'000},
       [&](Vec2 u) {
-        return sampleEmittedRay(emission.view(), emission.view().emitters[0], {random.next(), random.next()}, u).ray.d;
+        return sampleEmittedRay(emission.view(), emission.view().emitters[0], emission.view().bounds,
+                                {random.next(), random.next()}, u)
+            .ray.d;
       },
       density);
 }
@@ -296,8 +298,9 @@ TEST(EmittedRay, PositionsAreEvenOverTheLight) {
     return stats::chiSquaredSquare(
         {.samples = 100'000},
         [&](Vec2 u) -> std::optional<Vec2> {
-          return square(
-              sampleEmittedRay(emission.view(), emission.view().emitters[0], u, {random.next(), random.next()}).ray.o);
+          return square(sampleEmittedRay(emission.view(), emission.view().emitters[0], emission.view().bounds, u,
+                                         {random.next(), random.next()})
+                            .ray.o);
         },
         [&](Vec2 u) {
           const auto x = static_cast<double>(u.x);
@@ -330,7 +333,8 @@ TEST(EmittedRay, LeavesItsLightBehind) {
     int met = 0;
     for (int i = 0; i < 20'000; ++i) {
       const Vec2 position{random.next(), random.next()}, direction{random.next(), random.next()};
-      const EmittedRay r = sampleEmittedRay(scene->view, scene->view.emitters[0], position, direction);
+      const EmittedRay r =
+          sampleEmittedRay(scene->view, scene->view.emitters[0], scene->view.bounds, position, direction);
       if (r.ray.d.x == 0 || isBlack(r.flux)) continue;
       const RayHit hit = scene->surfaceRays->nearest(r.ray, 0, kInfinity);
       met += hit.found();

@@ -5,11 +5,14 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "scene/scenes.h"
 #include "stats/stats.h"
+#include "volume/volume_io.h"
 
 namespace virga {
 namespace {
@@ -152,13 +155,17 @@ TEST(VirtualLights, AnEmptySceneKeepsNone) {
 // --- media around the lights ---
 
 /// A camera in fog without end.
-std::string endless(const std::string& elements) {
+std::string endless(const std::string& elements, const char* sigmaT) {
   return elements +
-         R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.5"/><float name="albedo" value="0.8"/></medium>
+         fmt::format(
+             R"(<medium type="homogeneous" id="fog"><rgb name="sigma_t" value="{}"/><float name="albedo" value="0.8"/></medium>
     <sensor type="perspective" id="camera"><transform name="to_world"><lookat origin="0, 0, 9" target="0, 0, 0" up="0, 1, 0"/>
-    </transform><ref name="medium" id="fog"/></sensor>)";
+    </transform><ref name="medium" id="fog"/></sensor>)",
+             sigmaT);
 }
-SceneSnapshot endlessScene(const std::string& elements) { return buildScene(test::describe(endless(elements))); }
+SceneSnapshot endlessScene(const std::string& elements, const char* sigmaT = "0.5, 0.5, 0.5") {
+  return buildScene(test::describe(endless(elements, sigmaT)));
+}
 
 constexpr const char* kPoint = R"(<emitter type="point"/>)";
 
@@ -201,13 +208,94 @@ TEST(WalkStarts, OfLightsInACloudThatTheCameraDeclaresAgain) {
   EXPECT_FLOAT_EQ(extinctionAtStart(*endlessScene(kPoint + cloud)), 0.5f);
 }
 
+constexpr const char* kSky = R"(<emitter type="constant"/>)";
+constexpr const char* kSun = R"(<emitter type="directional"/>)";
+
 TEST(WalkStarts, LightFromInfinityDoesNotGetThroughFogWithoutEnd) {
-  for (const char* light : {R"(<emitter type="constant"/>)", R"(<emitter type="directional"/>)"}) {
+  for (const char* light : {kSky, kSun}) {
     const SceneSnapshot scene = endlessScene(std::string(R"(<shape type="sphere"/>)") + light);
     EXPECT_TRUE(traceVirtualLights(*scene, {.walks = 500}, kId).lights.empty()) << light;
     const SceneSnapshot clear = build(std::string(R"(<shape type="sphere"/>)") + light);
     EXPECT_FALSE(traceVirtualLights(*clear, {.walks = 500}, kId).lights.empty()) << light;
   }
+}
+// What surfaces get at first is drawn by the same numbers with fog and without.
+TEST(WalkStarts, LightFromInfinityGetsThroughWhereFogIsClear) {
+  struct Case {
+    const char* sigmaT;
+    Rgb through;
+  };
+  for (const Case& c : {Case{"0, 0, 0", {1, 1, 1}}, {"0.5, 0.5, 0", {0, 0, 1}}, {"0, 2, 0", {1, 0, 1}}})
+    for (const char* light : {kSky, kSun}) {
+      const std::string elements = std::string(R"(<shape type="sphere"/>)") + light;
+      const WalkOptions once{.walks = 200, .maxDepth = 1};
+      const VirtualLights clear = traceVirtualLights(*build(elements), once, kId);
+      const VirtualLights foggy = traceVirtualLights(*endlessScene(elements, c.sigmaT), once, kId);
+      ASSERT_EQ(foggy.lights.size(), clear.lights.size()) << c.sigmaT;
+      ASSERT_GT(clear.lights.size(), 50u);
+      for (size_t i = 0; i < clear.lights.size(); ++i) {
+        EXPECT_EQ(foggy.lights[i].p, clear.lights[i].p);
+        const Rgb expected = clear.lights[i].weight * c.through;
+        for (int ch = 0; ch < 3; ++ch)
+          EXPECT_NEAR(foggy.lights[i].weight[ch], expected[ch], 1e-5f * maxComponent(expected)) << c.sigmaT;
+      }
+    }
+}
+
+/// A volume of ones on disk for as long as it lives.
+struct OnesFile {
+  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("virga_ones.{}.vol", ::getpid());
+  OnesFile() { writeVol(path, {2, 2, 2, std::vector<float>(8, 1.f), {}}); }
+  ~OnesFile() { std::filesystem::remove(path); }
+};
+
+/// A camera that declares a grid of ones in a cube around 0, in [-2, 2]^3.
+SceneSnapshot gridScene(const OnesFile& file, const std::string& elements, double sigmaT, double edge = 4) {
+  return buildScene(test::describe(
+      elements + fmt::format(R"(<medium type="heterogeneous" id="grid"><volume name="sigma_t" type="gridvolume">
+      <string name="filename" value="{}"/><transform name="to_world"><translate value="-0.5"/><scale value="{}"/></transform>
+      </volume><float name="albedo" value="1"/><float name="scale" value="{}"/></medium>
+    <sensor type="perspective" id="camera"><transform name="to_world"><lookat origin="0, 0, 9" target="0, 0, 0" up="0, 1, 0"/>
+    </transform><ref name="medium" id="grid"/></sensor>)",
+                             file.path.string(), edge, sigmaT)));
+}
+
+// The shape, if there is one, is smaller than the grid: light is lost if walks start at shapes alone.
+TEST(WalkStarts, LightFromInfinityMeetsAllOfAGridWithoutEnd) {
+  const OnesFile file;
+  const std::string block =
+      R"(<shape type="sphere"><float name="radius" value="0.05"/><bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></shape>)";
+  for (const std::string& shapes : {std::string(), block})
+    for (const double sigmaT : {0.1, 1.0}) {
+      const SceneSnapshot scene = gridScene(file, shapes + kSun, sigmaT);
+      stats::Moments scattered, far;
+      for (uint32_t set = 0; set < 60; ++set) {
+        const VirtualLights all = traceVirtualLights(*scene, {.walks = 2000, .maxDepth = 1}, {7, set, 0, 0});
+        double sum = 0, behind = 0;
+        for (const LightVertex& v : all.lights) (v.p.z < 0 ? behind : sum) += static_cast<double>(v.weight.g) / 2000;
+        scattered.add(sum + behind), far.add(behind);
+      }
+      // Irradiance 1 along z on a square of 16, and an optical thickness of 2 sigma_t before the half that is behind.
+      const double most = 16 * (1 - std::exp(-4 * sigmaT)), half = 16 * (1 - std::exp(-2 * sigmaT));
+      EXPECT_NEAR(scattered.mean(), most, 4 * scattered.standardError() + 1e-3 * most) << sigmaT;
+      EXPECT_NEAR(far.mean(), half, 4 * far.standardError() + 2e-3 * most) << sigmaT;
+      EXPECT_LT(scattered.standardError(), 0.02 * most);
+    }
+}
+TEST(WalkStarts, ServeScenesThatLightFromInfinityMeetsAlike) {
+  const auto serve = [](const SceneSnapshot& before, const SceneSnapshot& next) {
+    return WalkStarts(*before).serve(WalkStarts(*next));
+  };
+  const std::string ball = R"(<shape type="sphere"/>)";
+  const SceneSnapshot thin = endlessScene(ball + kSky, "0.1, 0.1, 0.1"), thick = endlessScene(ball + kSky, "3, 2, 1"),
+                      clear = endlessScene(ball + kSky, "0, 0, 0"), blue = endlessScene(ball + kSky, "3, 2, 0");
+  EXPECT_TRUE(serve(thin, thick) && serve(thick, thin));
+  EXPECT_FALSE(serve(thin, clear) || serve(clear, thin) || serve(blue, thick));
+  EXPECT_TRUE(serve(endlessScene(ball + kPoint, "3, 2, 0"), endlessScene(ball + kPoint, "3, 2, 1")));
+  const OnesFile file;
+  const SceneSnapshot large = gridScene(file, ball + kSky, 1, 6), small = gridScene(file, ball + kSky, 2, 5);
+  EXPECT_TRUE(serve(large, small));
+  EXPECT_FALSE(serve(small, large)) << "walks would not meet all of it";
 }
 
 // A lamp that lies on the boundary of fog shines into it: what it emits inward meets all of the fog.
