@@ -3,6 +3,7 @@
 
 #include <bit>
 
+#include "core/warp.h"
 #include "methods/instant_scattering/light_visibility.h"
 
 namespace virga {
@@ -33,20 +34,46 @@ LampPoint lampPoint(const SceneView& scene, const ChosenLamp& lamp) {
   return point;
 }
 
+/// Where a sphere has a lamp's points: opposite each other, or four at the corners of a tetrahedron, so that about as
+/// much of them is seen from all sides. Passes turn it, and so do lamps, lest few points of many face the same way.
+Vec2 placeOnSphere(const FixedNumbers& numbers, int group, int k, int count) {
+  const auto g = static_cast<float>(group);
+  const Frame turned(uniformSphere(
+      {numbers.turned(0.5f + g * 0.7548777f, 0.7320508f), numbers.turned(0.5f + g * 0.5698403f, 0.2360680f)}));
+  Vec3 at(0, 0, k % 2 == 0 ? 1.f : -1.f);
+  if (count > 2 && k > 0)
+    at = sphericalDirection(std::sqrt(8.f) / 3, -1 / 3.f, kTwoPi * (numbers.shift() + static_cast<float>(k) / 3));
+  const Vec3 p = turned.toWorld(at);
+  const float azimuth = std::atan2(p.y, p.x) / kTwoPi;
+  return {clamp((1 - p.z) / 2, 0, 1), azimuth < 0 ? azimuth + 1 : azimuth};
+}
+
+/// Point k of a group on a lamp.
+ChosenLamp chosenLamp(const SceneView& scene, const FixedNumbers& numbers, int group, int k) {
+  const int count = numbers.onSurface(group);
+  ChosenLamp lamp = numbers.lamp(scene, group, k, count);
+  if (numbers.lamps[group].round) lamp.u = placeOnSphere(numbers, group, k, count);
+  return lamp;
+}
+
 }  // namespace
 
 void FrameLamps::chooseGroups(const SceneView& scene) {
   for (int i = 0; i < scene.emitters.size; ++i)
-    if (scene.emitterChoice.probability(i) > 0) groups_.push_back({i, 1});
+    if (scene.emitterChoice.probability(i) > 0) groups_.push_back({.lamp = i});
   if (groups_.empty()) return;
   if (groups_.size() > kMostPoints) {
-    groups_.assign(kMostPoints / FixedNumbers::kMostPlaces, {LampGroup::kDrawn, FixedNumbers::kMostPlaces});
+    groups_.assign(kMostPoints / FixedNumbers::kMostPlaces, LampGroup{.points = FixedNumbers::kMostPlaces});
     return;
   }
   const auto each = static_cast<int>(std::bit_floor(kMostPoints / groups_.size()));
   places_ = std::min(each, FixedNumbers::kMostPlaces);
-  for (LampGroup& group : groups_)
-    if (!scene.emitters[group.lamp].isDelta()) group.points = std::min(each, kMostOfLamp);
+  for (LampGroup& group : groups_) {
+    const EmitterView& emitter = scene.emitters[group.lamp];
+    if (!emitter.isDelta()) group.points = std::min(each, kMostOfLamp);
+    group.round =
+        emitter.kind == EmitterView::Kind::area && scene.surfaces[emitter.shape].kind == ShapeView::Kind::sphere;
+  }
 }
 
 FrameLamps::FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token& stop) {
@@ -57,7 +84,7 @@ FrameLamps::FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token&
   std::vector<Vec3> places;
   for (int group = 0; group < own.groups(); ++group)
     for (int k = 0; k < own.onSurface(group); ++k) {
-      const LampPoint& point = points_.emplace_back(lampPoint(view, own.lamp(view, group, k, own.onSurface(group))));
+      const LampPoint& point = points_.emplace_back(lampPoint(view, chosenLamp(view, own, group, k)));
       places.push_back(Vec3(point.px, point.py, point.pz) + Vec3(point.nx, point.ny, point.nz) * mapOffset(view));
     }
   if (std::none_of(points_.begin(), points_.end(), [](const LampPoint& point) { return point.known; })) places.clear();

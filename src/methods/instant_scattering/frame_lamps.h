@@ -40,9 +40,10 @@ class FrameLamps {
   void visitTurns(int n, int places, Visit&& visit) const {
     int first = 0;
     for (const LampGroup& group : groups_) {
-      const int k = first + n % group.points;
-      if (points_[static_cast<size_t>(k)].known)
-        visit(Turn{k, static_cast<float>(group.points) / static_cast<float>(places)});
+      const int from = group.round ? 0 : n % group.points, to = group.round ? group.points : from + 1;
+      const float share = static_cast<float>(group.points) / static_cast<float>(places * (to - from));
+      for (int k = first + from; k < first + to; ++k)
+        if (points_[static_cast<size_t>(k)].known) visit(Turn{k, share});
       first += group.points;
     }
   }

@@ -49,8 +49,9 @@ struct RandomNumbers {
 struct LampGroup {
   static constexpr int kDrawn = -1;
 
-  int lamp = kDrawn;  ///< index of the emitter
-  int points = 1;     ///< on surfaces; a power of two, places() at most
+  int lamp = kDrawn;   ///< index of the emitter
+  int points = 1;      ///< on surfaces; a power of two, places() at most
+  bool round = false;  ///< most places see a part of the points alone: all of them light each place in media
 };
 
 /// The same in every pixel (`frame`): points of an even set, turned by a number of the pass. Nothing shimmers; what an
