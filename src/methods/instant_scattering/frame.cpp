@@ -151,7 +151,7 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   kept.maps = {options.visibility.resolution, options.visibility.points};
   FrameLights::Kept none;
   auto lights = std::make_unique<FrameLights>(scene, std::move(traced), kept, keeps ? kept_[id.index] : none, stop);
-  auto lamps = std::make_unique<FrameLamps>(scene, FixedNumbers{id.index}, stop);
+  auto lamps = std::make_unique<FrameLamps>(scene, id.index, stop);
   if (stop.stop_requested()) return false;
   lamps_ = std::move(lamps);
   lights_ = std::move(lights);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <span>
 #include <stop_token>
+#include <vector>
 
 #include "methods/instant_scattering/lamp_kernels.h"
 #include "methods/instant_scattering/marched_light.h"
@@ -9,28 +12,60 @@
 
 namespace virga {
 
-/// Fixed points of the lamps, and what the media let through from them. They depend on the scene, not on the camera.
+/// Fixed points of the lamps, and what the media let through from them. They depend on the scene and the pass, not on
+/// the camera. Every lamp has its own: up to kMostPoints together, fewer of each the more lamps there are, and only one
+/// of those without an extent. Of more than kMostPoints lamps that many points are drawn by power.
 class FrameLamps {
  public:
-  /// A stop leaves tables undefined.
-  FrameLamps(const Scene& scene, const FixedNumbers& numbers, const std::stop_token& stop);
+  static constexpr int kMostPoints = 64;
 
-  const LampPoints& points() const { return points_; }
-  /// A single lamp without an extent: all points are the same, and surfaces need one.
-  bool allAlike() const { return allAlike_; }
+  /// A stop leaves tables undefined.
+  FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token& stop);
+
+  FixedNumbers numbers(uint32_t pass) const {
+    return {pass, {groups_.data(), static_cast<int>(groups_.size())}, places_};
+  }
+
+  std::span<const LampPoint> points() const { return points_; }
   /// The light of any pixel can be found by packets: all lamps are points or areas.
-  bool alone() const { return points_.alone; }
+  bool alone() const { return alone_; }
+
+  /// A point, by its number, lights a place on each eye ray, and with what share of its intensity.
+  struct Turn {
+    int point;
+    float share;
+  };
+  /// In place number n of `places`, a power of two.
+  template <class Visit>
+  void visitTurns(int n, int places, Visit&& visit) const {
+    int first = 0;
+    for (const LampGroup& group : groups_) {
+      const int from = group.round ? 0 : n % group.points, to = group.round ? group.points : from + 1;
+      const float share = static_cast<float>(group.points) / static_cast<float>(places * (to - from));
+      for (int k = first + from; k < first + to; ++k)
+        if (points_[static_cast<size_t>(k)].known) visit(Turn{k, share});
+      first += group.points;
+    }
+  }
+
+  /// Places on each eye ray that each group lights: in media that are marched, and in fog, by angle.
+  int places() const { return places_; }
+  int fogPlaces() const { return std::min(places_, kMostInFog); }
 
   /// Media that are bounded and homogeneous: the way to a lamp is known exactly, a stretch at a time.
   bool marches() const { return marches_; }
   /// Transmittance from point number k, where it does not march; as MediaBetween::look().
-  void look(int k, const KernelReceivers& to, float* seen[3]) const {
-    between_.look(allAlike_ ? 0 : static_cast<size_t>(k), to, seen);
-  }
+  void look(int k, const KernelReceivers& to, float* seen[3]) const { between_.look(static_cast<size_t>(k), to, seen); }
 
  private:
-  LampPoints points_;
-  bool allAlike_ = false, marches_ = false;
+  static constexpr int kMostInFog = 4;
+
+  void chooseGroups(const SceneView& scene);
+
+  std::vector<LampGroup> groups_;
+  int places_ = FixedNumbers::kMostPlaces;
+  std::vector<LampPoint> points_;  ///< of the first group, of the second...
+  bool alone_ = true, marches_ = false;
   MediaBetween between_;
 };
 

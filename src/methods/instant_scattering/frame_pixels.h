@@ -21,7 +21,7 @@ class FramePixels {
         rays_{*scene.surfaceRays, *scene.boundaryRays},
         lights_(lights),
         options_(options),
-        numbers_{pass},
+        numbers_(lamps.numbers(pass)),
         offset_(scene.filter.sample(numbers_.place())),
         packets_(scene_, rays_, lamps, numbers_) {}
   FramePixels(const FramePixels&) = delete;

@@ -22,13 +22,6 @@ struct LampPoint {
   float area = 0;                ///< of the whole lamp [unit^2]; 0 if it has none
 };
 
-struct LampPoints {
-  static constexpr int kCount = 4;
-
-  LampPoint point[kCount];
-  bool alone = true;  ///< there are no lamps of other kinds
-};
-
 /// Places in media.
 struct KernelPlaces {
   alignas(64) float px[RayPacket::kSize], py[RayPacket::kSize], pz[RayPacket::kSize];

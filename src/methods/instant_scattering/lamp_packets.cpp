@@ -61,7 +61,7 @@ bool LampPackets::isFog(const MarchedEye& eye) const {
 
 bool LampPackets::isLitByPackets(const MarchedEye& eye) const {
   if (!lamps_.alone() || eye.side.bsdf->kind() != Bsdf::Kind::diffuse) return false;
-  for (const LampPoint& lamp : lamps_.points().point)
+  for (const LampPoint& lamp : lamps_.points())
     if (lengthSquared(placeOf(lamp) - eye.point.p) < square(kNearLamp) * lamp.area) return false;
   return true;
 }
@@ -109,15 +109,14 @@ void LampPackets::lightSurfaces(std::span<const MarchedEye> eyes, std::span<Laye
     reflected[i] = bsdf * transmittanceOf(eye.depth);
     any = true;
   }
-  const int count = any ? (lamps_.allAlike() ? 1 : LampPoints::kCount) : 0;
-  const float share = static_cast<float>(LampPoints::kCount) / static_cast<float>(std::max(1, count));
-  for (int k = 0; k < count; ++k) {
-    const LampPoint& lamp = lamps_.points().point[k];
+  const std::span<const LampPoint> points = lamps_.points();
+  for (size_t k = 0; any && k < points.size(); ++k) {
+    const LampPoint& lamp = points[k];
     if (!lamp.known) continue;
     alignas(64) Lanes value;
     RayPacket rays;
     virga::lightSurfaces(lamp, surfaces, scene_.scale, value, rays);
-    const Seen seen = see(k, surfaces, rays, [&](int i) {
+    const Seen seen = see(static_cast<int>(k), surfaces, rays, [&](int i) {
       const MarchedEye& eye = eyes[static_cast<size_t>(i)];
       MediaRay leaving = leaveSurface(scene_, eye.point, -eye.at.ray.d, rayOf(rays, i).d, eye.at.media);
       leaving.ray = rayOf(rays, i);
@@ -127,7 +126,7 @@ void LampPackets::lightSurfaces(std::span<const MarchedEye> eyes, std::span<Laye
       if (value[i] > 0)
         radiance[i].add(Layer::directSurface,
                         reflected[i] * intensityOf(lamp) *
-                            (Rgb(seen.channel[0][i], seen.channel[1][i], seen.channel[2][i]) * (value[i] * share)));
+                            (Rgb(seen.channel[0][i], seen.channel[1][i], seen.channel[2][i]) * value[i]));
   }
 }
 
@@ -144,62 +143,55 @@ void LampPackets::lightFog(std::span<const MarchedEye> eyes, std::span<LayerRadi
     if (!lamps_.alone())
       marched_.lightMedia(eyes[i], MarchedLight<EmbreeRays>::MediaLamps::atInfinity, radiance[i], numbers_);
   }
-  for (int k = 0; any && k < LampPoints::kCount; ++k) {
-    const LampPoint& lamp = lamps_.points().point[k];
-    if (!lamp.known) continue;
-    alignas(64) float value[3][kSize];
-    KernelPlaces at;
-    RayPacket rays;
-    virga::lightFog(lamp, fog, (static_cast<float>(k) + numbers_.shift()) / LampPoints::kCount, scene_.scale, at, value,
-                    rays);
-    const Seen seen = see(k, at, rays, [&](int i) {
-      return MediaRay{rayOf(rays, i), eyes[static_cast<size_t>(i)].media[0], 0};
+  const int places = any ? lamps_.fogPlaces() : 0;
+  for (int n = 0; n < places; ++n)
+    lamps_.visitTurns(n, places, [&](const FrameLamps::Turn& turn) {
+      const LampPoint& lamp = lamps_.points()[static_cast<size_t>(turn.point)];
+      alignas(64) float value[3][kSize];
+      KernelPlaces at;
+      RayPacket rays;
+      virga::lightFog(lamp, fog, along(n, places), scene_.scale, at, value, rays);
+      const Seen seen = see(turn.point, at, rays, [&](int i) {
+        return MediaRay{rayOf(rays, i), eyes[static_cast<size_t>(i)].media[0], 0};
+      });
+      for (size_t i = 0; i < eyes.size(); ++i) {
+        if (!(fog.t1[i] > fog.t0[i])) continue;
+        Rgb found = albedo[i] * intensityOf(lamp) * turn.share;
+        for (int c = 0; c < 3; ++c) found[c] *= value[c][i] * seen.channel[c][i];
+        radiance[i].add(Layer::directMedia, found);
+      }
     });
-    for (size_t i = 0; i < eyes.size(); ++i) {
-      if (!(fog.t1[i] > fog.t0[i])) continue;
-      Rgb found = albedo[i] * intensityOf(lamp);
-      for (int c = 0; c < 3; ++c) found[c] *= value[c][i] * seen.channel[c][i];
-      radiance[i].add(Layer::directMedia, found);
-    }
-  }
 }
 
 void LampPackets::lightSmoke(std::span<const MarchedEye> eyes, const EyePacket& smoke,
                              std::span<LayerRadiance> radiance) const {
-  constexpr int kPoints = FixedNumbers::kPoints;
   const KernelEyes& e = smoke.eyes();
   if (e.from > e.to) return;
   const auto* hg = smoke.medium().phase.get<HenyeyGreenstein>();
   alignas(64) float sum[3][kSize] = {};
-  for (int n = 0; n < kPoints; ++n) {
-    const int k = n % LampPoints::kCount;
-    const LampPoint& lamp = lamps_.points().point[k];
-    if (!lamp.known) continue;
+  const int places = lamps_.places();
+  for (int n = 0; n < places; ++n) {
     EyePoints at;
-    alignas(64) Lanes value;
-    RayPacket rays;
-    placePoints(e, smoke.depths(), (static_cast<float>(n) + numbers_.shift()) / kPoints, at);
-    lightEyes(lamp, e, at, hg ? hg->g : 0, scene_.scale, value, rays);
-    const Seen seen = see(k, at, rays, [&](int i) { return MediaRay{rayOf(rays, i), {}, 0}; });
-    const Rgb intensity = intensityOf(lamp);
-    for (int c = 0; c < 3; ++c)
-      for (int i = 0; i < kSize; ++i) sum[c][i] += at.weight[c][i] * value[i] * seen.channel[c][i] * intensity[c];
+    placePoints(e, smoke.depths(), along(n, places), at);
+    lamps_.visitTurns(n, places, [&](const FrameLamps::Turn& turn) {
+      const LampPoint& lamp = lamps_.points()[static_cast<size_t>(turn.point)];
+      alignas(64) Lanes value;
+      RayPacket rays;
+      lightEyes(lamp, e, at, hg ? hg->g : 0, scene_.scale, value, rays);
+      const Seen seen = see(turn.point, at, rays, [&](int i) { return MediaRay{rayOf(rays, i), {}, 0}; });
+      const Rgb intensity = intensityOf(lamp) * turn.share;
+      for (int c = 0; c < 3; ++c)
+        for (int i = 0; i < kSize; ++i) sum[c][i] += at.weight[c][i] * value[i] * seen.channel[c][i] * intensity[c];
+    });
   }
-  // Each lamp's intensity is shared by kCount points, whose turn comes kPoints / kCount times.
-  constexpr float kShare = static_cast<float>(LampPoints::kCount) / kPoints;
   for (size_t i = 0; i < eyes.size(); ++i)
     if (eyes[i].plain && smoke.has(i))
-      radiance[i].add(Layer::directMedia, Rgb(sum[0][i], sum[1][i], sum[2][i]) * smoke.medium().albedo * kShare);
+      radiance[i].add(Layer::directMedia, Rgb(sum[0][i], sum[1][i], sum[2][i]) * smoke.medium().albedo);
 }
 
 void LampPackets::lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const {
-  constexpr int kPoints = FixedNumbers::kPoints;
-  struct Point {
-    Rgb weight;
-    const MediaState* media = nullptr;
-  };
-  KernelPlaces places[kPoints] = {};
-  Point points[kPoints][kSize];
+  MediaPlaces at[FixedNumbers::kMostPlaces] = {};
+  const int places = lamps_.places();
   bool any = false;
   for (size_t i = 0; i < eyes.size(); ++i) {
     if (!eyes[i].plain || eyes[i].steps == 0 || isFog(eyes[i])) continue;
@@ -207,32 +199,32 @@ void LampPackets::lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRa
       marched_.lightMedia(eyes[i], MarchedLight<EmbreeRays>::MediaLamps::all, radiance[i], numbers_);
       continue;
     }
-    eyes[i].visitPoints(kPoints, numbers_.shift(), [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
-      set(places[k], static_cast<int>(i), p);
-      points[k][i] = {weight, &media};
+    eyes[i].visitPoints(places, numbers_.shift(), [&](int n, Vec3 p, Rgb weight, const MediaState& media) {
+      set(at[n], static_cast<int>(i), p);
+      at[n].weight[i] = weight, at[n].media[i] = &media;
       any = true;
     });
   }
-  for (int n = 0; any && n < kPoints; ++n) {
-    const int k = n % LampPoints::kCount;
-    const LampPoint& lamp = lamps_.points().point[k];
-    if (!lamp.known) continue;
-    alignas(64) Lanes value;
-    RayPacket rays;
-    virga::lightMedia(lamp, places[n], scene_.scale, value, rays);
-    for (size_t i = 0; i < kSize; ++i)
-      if (!points[n][i].media) value[i] = rays.tMax[i] = 0;
-    const Seen seen = see(k, places[n], rays, [&](int i) { return MediaRay{rayOf(rays, i), *points[n][i].media, 0}; });
-    for (size_t i = 0; i < eyes.size(); ++i) {
-      if (!(value[i] > 0)) continue;
-      const Ray ray = rayOf(rays, static_cast<int>(i));
-      const Rgb scattered = marched_.scatteringAt(ray.o, -eyes[i].at.ray.d, ray.d, *points[n][i].media);
-      // Each lamp's intensity is shared by kCount points, whose turn comes kPoints / kCount times.
-      constexpr float kShare = static_cast<float>(LampPoints::kCount) / kPoints;
-      radiance[i].add(Layer::directMedia,
-                      points[n][i].weight * scattered * intensityOf(lamp) *
-                          (Rgb(seen.channel[0][i], seen.channel[1][i], seen.channel[2][i]) * (value[i] * kShare)));
-    }
+  for (int n = 0; any && n < places; ++n)
+    lamps_.visitTurns(n, places, [&](const FrameLamps::Turn& turn) { lightMedia(turn, eyes, at[n], radiance); });
+}
+
+void LampPackets::lightMedia(const FrameLamps::Turn& turn, std::span<const MarchedEye> eyes, const MediaPlaces& at,
+                             std::span<LayerRadiance> radiance) const {
+  const LampPoint& lamp = lamps_.points()[static_cast<size_t>(turn.point)];
+  alignas(64) Lanes value;
+  RayPacket rays;
+  virga::lightMedia(lamp, at, scene_.scale, value, rays);
+  for (size_t i = 0; i < kSize; ++i)
+    if (!at.media[i]) value[i] = rays.tMax[i] = 0;
+  const Seen seen = see(turn.point, at, rays, [&](int i) { return MediaRay{rayOf(rays, i), *at.media[i], 0}; });
+  for (size_t i = 0; i < eyes.size(); ++i) {
+    if (!(value[i] > 0)) continue;
+    const Ray ray = rayOf(rays, static_cast<int>(i));
+    const Rgb scattered = marched_.scatteringAt(ray.o, -eyes[i].at.ray.d, ray.d, *at.media[i]);
+    radiance[i].add(Layer::directMedia,
+                    at.weight[i] * scattered * intensityOf(lamp) *
+                        (Rgb(seen.channel[0][i], seen.channel[1][i], seen.channel[2][i]) * (value[i] * turn.share)));
   }
 }
 

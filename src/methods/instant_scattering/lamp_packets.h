@@ -36,6 +36,18 @@ class LampPackets {
   void lightFog(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
   void lightSmoke(std::span<const MarchedEye> eyes, const EyePacket& smoke, std::span<LayerRadiance> radiance) const;
   void lightMedia(std::span<const MarchedEye> eyes, std::span<LayerRadiance> radiance) const;
+  /// A place in media on each eye ray.
+  struct MediaPlaces : KernelPlaces {
+    Rgb weight[kSize];
+    const MediaState* media[kSize];  ///< none where the ray has no such place
+  };
+  /// By one point of a lamp.
+  void lightMedia(const FrameLamps::Turn& turn, std::span<const MarchedEye> eyes, const MediaPlaces& at,
+                  std::span<LayerRadiance> radiance) const;
+  /// The n-th of `places` on an eye ray, as a share of it.
+  float along(int n, int places) const {
+    return (static_cast<float>(n) + numbers_.shift()) / static_cast<float>(places);
+  }
   /// Visibility times transmittance from a lamp's point to places, along the rays that were made for them.
   /// mediaRay(lane): such a ray, with the media at its start.
   template <class MediaRayOf>

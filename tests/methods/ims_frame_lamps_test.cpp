@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every lamp lights each frame of instant multiple scattering.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "methods/rendering.h"
+
+namespace virga {
+namespace {
+
+using namespace virga::testing;
+
+constexpr Layer kDirect[] = {Layer::directSurface, Layer::directMedia};
+
+/// A ball over a floor, in a box of fog.
+std::string fogBox(const std::string& lamps) {
+  return lamps + R"(
+    <sensor type="perspective"><float name="fov" value="40"/><transform name="to_world">
+      <lookat origin="0.3, 0.3, 4" target="0, -0.1, 0" up="0, 1, 0"/></transform>
+      <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="24"/><rfilter type="box"/></film>
+    </sensor>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><rotate x="1" angle="-90"/>
+      <translate y="-1"/></transform><bsdf type="diffuse"/></shape>
+    <shape type="sphere"><float name="radius" value="0.4"/><bsdf type="diffuse"/></shape>
+    <shape type="cube"><bsdf type="null"/><transform name="to_world"><scale x="2.2" y="0.9" z="1.4"/></transform>
+      <medium name="interior" type="homogeneous"><float name="sigma_t" value="0.3"/><float name="albedo" value="0.9"/>
+      </medium></shape>)";
+}
+/// Number k of some in a row, through the fog and above it.
+std::string pointLamp(int k, int of) {
+  return fmt::format(R"(<emitter type="point"><point name="position" x="{}" y="{}" z="{}"/>
+                       <rgb name="intensity" value="{}"/></emitter>)",
+                     -1.8 + 3.6 * k / (of - 1), k % 2 ? 1.3 : 0.6, k % 3 - 1, 2.4 / of);
+}
+std::string pointLamps(int count) {
+  std::string all;
+  for (int k = 0; k < count; ++k) all += pointLamp(k, count);
+  return all;
+}
+
+RenderSession frame(const std::string& lamps, int passes = 1) {
+  const SettingValues settings{{"mode", "frame"}, {"max_depth", "2"}, {"walks", "16"}};
+  return rendered(sceneOf(fogBox(lamps)),
+                  {.passes = passes, .layers = LayerMask::all(), .method = "ims", .settings = settings});
+}
+
+/// Layers of direct light against those of `path`, as a whole.
+void expectNear(const std::string& lamps, int passes, double tolerance) {
+  const RenderSession own = frame(lamps, passes);
+  const RenderSession truth = rendered(
+      sceneOf(fogBox(lamps)), {.passes = 256, .seed = 5, .layers = LayerMask::all(), .settings = {{"max_depth", "2"}}});
+  for (const Layer layer : kDirect) {
+    const double found = pixelMoments(own.film().layer(layer)).mean();
+    const stats::Moments expected = replicateMoments(truth.film(), layer);
+    const double noise = 4 * expected.standardError();
+    fmt::print("{}: {:.4f} of the truth\n", kLayerNames[static_cast<size_t>(layer)], found / expected.mean());
+    EXPECT_NEAR(found, expected.mean(), tolerance * expected.mean() + noise) << kLayerNames[static_cast<size_t>(layer)];
+    EXPECT_LT(noise, 0.05 * expected.mean()) << "too few samples to tell";
+  }
+}
+
+TEST(ImsFrameLamps, OneFrameOfEightIsTheSumOfEight) {
+  constexpr int kLamps = 8;
+  const RenderSession all = frame(pointLamps(kLamps));
+  for (const Layer layer : kDirect) {
+    Image rest = all.film().layer(layer);
+    const double level = pixelMoments(rest).mean();
+    double least = level;
+    for (int k = 0; k < kLamps; ++k) {
+      const Image one = frame(pointLamp(k, kLamps)).film().layer(layer);
+      least = std::min(least, pixelMoments(one).mean());
+      for (size_t i = 0; i < rest.pixels.size(); ++i) rest.pixels[i] += one.pixels[i] * -1.f;
+    }
+    for (const Rgb& pixel : rest.pixels) ASSERT_NEAR(mean(pixel), 0, 1e-4 * level);
+    EXPECT_GT(least, 0.01 * level) << "the test cannot tell whether a lamp is left out";
+  }
+}
+
+TEST(ImsFrameLamps, OneFrameOfEightIsTheTruth) { expectNear(pointLamps(8), 1, 0.02); }
+
+TEST(ImsFrameLamps, OneFrameOfTwoWithExtentIsNearTheTruth) {
+  expectNear(R"(
+    <shape type="rectangle"><transform name="to_world"><scale value="0.4"/><rotate x="1" angle="90"/>
+      <translate x="-1" y="1.6"/></transform><emitter type="area"><rgb name="radiance" value="6, 5, 4"/></emitter></shape>
+    <shape type="sphere"><float name="radius" value="0.25"/><point name="center" x="1.7" y="1.2" z="0.7"/>
+      <emitter type="area"><rgb name="radiance" value="3, 6, 9"/></emitter></shape>)",
+             1, 0.05);
+}
+
+// Too many for a point each: they are drawn, and passes find them all.
+TEST(ImsFrameLamps, PassesFindHowManyLampsThereAre) { expectNear(pointLamps(100), 64, 0.02); }
+
+TEST(ImsFrameLamps, ManyAreAFunctionOfTheirInputForAnyNumberOfThreads) {
+  const auto picture = [](size_t threads) {
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return frame(pointLamps(12)).film().beauty();
+  };
+  const Image one = picture(1);
+  EXPECT_EQ(largestDifference(one, picture(4)), 0);
+  EXPECT_EQ(largestDifference(one, picture(1)), 0);
+}
+
+}  // namespace
+}  // namespace virga
