@@ -161,6 +161,26 @@ TEST(ImsFrame, LayersOfAPlumeAreNearTheTruth) {
   expectNear(plume(48), 0.1, 8, {{"walks", "65536"}});  // few of which meet the plume
 }
 TEST(ImsFrame, LayersOfFogAreNearTheTruth) { expectNear(fog(32), 0.06, 16, {{"lights", "650"}}); }
+// Lights lie many mean free paths apart in fog without end, most of them near the lamp: one radius by how wide they lie
+// loses most of what they light.
+TEST(ImsFrame, LayersOfThinFogWithoutEndAreNearTheTruth) {
+  const std::string scene =
+      R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.1"/>
+    <float name="albedo" value="0.9"/></medium>)" +
+      pinpointSensor("0.3, 0.3, 4", "0, -0.1, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)") +
+      R"(
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><rotate x="1" angle="-90"/><translate y="-1"/>
+      </transform><bsdf type="diffuse"><rgb name="reflectance" value="0.6"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="-1.5"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.6"/><rotate x="1" angle="90"/>
+      <translate y="1.6"/></transform><emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>)";
+  expectNear(scene, 0.15, 8);
+  const auto light = [&](const SettingValues& settings) {
+    return pixelMoments(indirect(frames(scene, 2, settings))).mean();
+  };
+  EXPECT_LT(light({{"radius", "5"}}), 0.7 * light({})) << "the test cannot tell";
+}
 // Bsdfs and phase functions that the kernels do not know go by their own scattering; glass goes by paths.
 TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
   const std::string phong = R"(<bsdf type="phong"><rgb name="diffuse_reflectance" value="0.3"/>
