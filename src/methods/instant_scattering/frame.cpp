@@ -11,6 +11,9 @@ namespace {
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
 constexpr int kGroup = 64;
 
+/// Radius of clamping, over that of the balls: what is clamped by a larger one takes more than a level to find again.
+constexpr float kClampedShare = 0.7f;
+
 /// By how much media may change while a walk is kept. Measured: docs/decisions/frame-sequences.md.
 constexpr float kMostChange = 0.05f;
 
@@ -169,7 +172,7 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, const Sa
   ImsOptions own = options;
   // Of spread lights each has a ball of its own; compensation knows one radius for all.
   if (!(own.frame.near.bound > 0) && own.frame.near.kind == NearField::Kind::clamped)
-    own.frame.near.bound = 1 / square(lights_->medianRadius());
+    own.frame.near.bound = 1 / square(kClampedShare * lights_->medianRadius());
   const size_t pixels = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
   if (features_.size() != pixels) features_ = LargeArray<PixelFeatures>(pixels);
   return FramePass(scene, *lights_, *lamps_, own, id).run(stop, {features_.data(), pixels}, frame);
