@@ -7,6 +7,7 @@
 #include "methods/ims_scenes.h"
 #include "methods/instant_scattering/frame_lights.h"
 #include "methods/instant_scattering/lamp_packets.h"
+#include "methods/instant_scattering/light_spacing.h"
 #include "methods/instant_scattering/pixel_features.h"
 #include "methods/rendering.h"
 #include "volume/grid.h"
@@ -18,16 +19,54 @@ namespace {
 
 using namespace virga::testing;
 
+// In a medium with an optical depth of `depth` along the ball's radius, light within the ball is that of its middle.
 TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
   const float bound = 4, radius = 0.5f;  // 1 / sqrt(bound)
-  double spread = 0;
-  const int n = 100000;
-  for (int i = 0; i < n; ++i) {
-    const float d = radius * (static_cast<float>(i) + 0.5f) / n;
-    spread += static_cast<double>(kernels::spreadFalloff(d * d, bound) * d * d) * static_cast<double>(radius) / n;
+  for (const float depth : {0.f, 0.5f, 2.f, 6.f}) {
+    const float core = coreFor(depth);
+    double spread = 0, point = 0, plain = 0;
+    const int n = 100000;
+    for (int i = 0; i < n; ++i) {
+      const float u = (static_cast<float>(i) + 0.5f) / n, d2 = square(radius * u);
+      const double through = std::exp(-static_cast<double>(depth * u));
+      spread += static_cast<double>(kernels::spreadFalloff(d2, bound, core) * d2) * through;
+      plain += static_cast<double>(kernels::spreadFalloff(d2, bound, NearField::kPlainCore) * d2) * through;
+      point += through;  // 1 / d^2
+    }
+    EXPECT_NEAR(spread / point, 1, 1e-3) << depth;
+    if (depth >= 2) {
+      EXPECT_LT(plain / point, 0.8) << depth;
+    }
+    EXPECT_NEAR(kernels::spreadFalloff(0.2499f, bound, core), kernels::spreadFalloff(0.2501f, bound, core), 0.01f);
   }
-  EXPECT_NEAR(spread, static_cast<double>(radius), 1e-4);  // as does 1 / d^2
-  EXPECT_NEAR(kernels::spreadFalloff(0.2499f, bound), kernels::spreadFalloff(0.2501f, bound), 0.01f);
+  EXPECT_NEAR(coreFor(0), NearField::kPlainCore, 7e-3f);
+}
+
+TEST(FrameLights, NeighboursAreThoseOfAllPairs) {
+  const auto number = [](int i, double step) { return static_cast<float>(std::fmod(i * step, 1)); };
+  std::vector<PlacedLight> lights;
+  for (int i = 0; i < 500; ++i) {
+    const float x = number(i, 0.8191725134), spread = i % 3 ? 1.f : 20.f;
+    lights.push_back({Vec3(x, number(i, 0.6710436067), number(i, 0.5497004779)) * spread, 1 + number(i, 0.618034)});
+  }
+  for (int i = 0; i < 20; ++i) lights.push_back({Vec3(3, 3, 3), 1});  // in one place
+  const float times = 9;
+  const std::vector<float> radii = radiiOfNeighbours(lights, times, 40, 3);
+  for (size_t i = 0; i < lights.size(); ++i) {
+    std::vector<std::pair<float, float>> all;
+    for (const PlacedLight& l : lights) all.emplace_back(lengthSquared(l.p - lights[i].p), l.weight);
+    std::sort(all.begin(), all.end());
+    float sum = 0, d2 = 0;
+    for (const auto& [distance2, weight] : all) {
+      sum += weight, d2 = distance2;
+      if (sum >= times * lights[i].weight) break;
+    }
+    EXPECT_NEAR(radii[i], std::sqrt(d2), 1e-5f) << i;
+  }
+  EXPECT_EQ(radii.back(), 0);
+  EXPECT_TRUE(radiiOfNeighbours({}, times, 40, 3).empty());
+  const std::vector<PlacedLight> two{{Vec3(0, 0, 0), 1}, {Vec3(0, 2, 0), 1}};
+  EXPECT_FLOAT_EQ(radiiOfNeighbours(two, 8, 16, 2)[0], 4) << "as if there were more, as dense";
 }
 
 TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {

@@ -141,9 +141,9 @@ TEST(ImsFrame, NothingFlickersInSmokeThatHardlyChanges) {
 // --- accuracy ---
 
 void expectNear(const std::string& elements, double tolerance, int passes, const SettingValues& settings = {},
-                int truthPasses = 240) {
-  const RenderSession truth =
-      rendered(sceneOf(elements), {.passes = truthPasses, .seed = 5, .layers = LayerMask::all()});
+                int truthPasses = 240, const SettingValues& truthSettings = {}) {
+  const RenderSession truth = rendered(
+      sceneOf(elements), {.passes = truthPasses, .seed = 5, .layers = LayerMask::all(), .settings = truthSettings});
   const RenderSession own = frames(elements, passes, settings);
   const double beauty = replicateMoments(truth.film()).mean();
   for (int l = 0; l < kLayerCount; ++l) {
@@ -161,6 +161,27 @@ TEST(ImsFrame, LayersOfAPlumeAreNearTheTruth) {
   expectNear(plume(48), 0.1, 8, {{"walks", "65536"}});  // few of which meet the plume
 }
 TEST(ImsFrame, LayersOfFogAreNearTheTruth) { expectNear(fog(32), 0.06, 16, {{"lights", "650"}}); }
+// Lights lie many mean free paths apart in fog without end, most of them near the lamp: one radius by how wide they lie
+// loses most of what they light.
+TEST(ImsFrame, LayersOfThinFogWithoutEndAreNearTheTruth) {
+  const std::string scene =
+      R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.1"/>
+    <float name="albedo" value="0.9"/></medium>)" +
+      pinpointSensor("0.3, 0.3, 4", "0, -0.1, 0", "0, 1, 0", 16, R"(<ref name="medium" id="fog"/>)") +
+      R"(
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><rotate x="1" angle="-90"/><translate y="-1"/>
+      </transform><bsdf type="diffuse"><rgb name="reflectance" value="0.6"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="3"/><translate z="-1.5"/></transform>
+      <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.6"/><rotate x="1" angle="90"/>
+      <translate y="1.6"/></transform><emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>)";
+  const SettingValues depth{{"max_depth", "7"}};
+  expectNear(scene, 0.15, 8, depth, 240, depth);
+  const auto light = [&](const SettingValues& settings) {
+    return pixelMoments(indirect(frames(scene, 2, settings))).mean();
+  };
+  EXPECT_LT(light({{"max_depth", "7"}, {"radius", "8"}}), 0.7 * light(depth)) << "the test cannot tell";
+}
 // Bsdfs and phase functions that the kernels do not know go by their own scattering; glass goes by paths.
 TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
   const std::string phong = R"(<bsdf type="phong"><rgb name="diffuse_reflectance" value="0.3"/>

@@ -11,8 +11,8 @@ namespace {
 /// Pixels that are gathered together: their receivers' arrays and a light's tables stay in the nearest cache.
 constexpr int kGroup = 64;
 
-/// Radius of a light that is spread, in spacings of the lights.
-constexpr float kRadiusSpacings = 2;
+/// Radius of clamping, over that of the balls: what is clamped by a larger one takes more than a level to find again.
+constexpr float kClampedShare = 0.7f;
 
 /// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
 template <class Body>
@@ -146,6 +146,8 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   if (stop.stop_requested()) return false;
   FrameLights::Options kept;
   kept.most = options.frameLights;
+  kept.balls = !(options.frame.near.bound > 0);
+  kept.radius = options.compensation.radius;
   kept.turn = FixedNumbers{id.index}.shift();
   if (options.frame.visibility != ReceiverBatch::Visibility::maps) kept.shadows = FrameLights::ShadowMapping::none;
   kept.maps = {options.visibility.resolution, options.visibility.points};
@@ -163,9 +165,9 @@ bool FrameRenderer::pass(const Scene& scene, const ImsOptions& options, const Sa
                          const std::stop_token& stop, PassFrame& frame) {
   if (!prepareLights(scene, options, id, walks, stop)) return false;
   ImsOptions own = options;
-  const float spacing = lights_->spacing();  // none, if they all lie in a plane
-  if (!(own.frame.near.bound > 0))
-    own.frame.near.bound = spacing > 0 ? 1 / square(kRadiusSpacings * spacing) : own.gather.bound;
+  // Of spread lights each has a ball of its own; compensation knows one radius for all.
+  if (!(own.frame.near.bound > 0) && own.frame.near.kind == NearField::Kind::clamped)
+    own.frame.near.bound = 1 / square(kClampedShare * lights_->medianRadius());
   const size_t pixels = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
   if (features_.size() != pixels) features_ = LargeArray<PixelFeatures>(pixels);
   return FramePass(scene, *lights_, *lamps_, own, id).run(stop, {features_.data(), pixels}, frame);

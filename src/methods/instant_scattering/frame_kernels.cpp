@@ -36,9 +36,9 @@ void gather(const KernelLight& light, EndKind from, const KernelReceivers& to, E
   withKind(from, [&](auto f) {
     withKind(kind, [&](auto k) {
       if (near.kind == NearField::Kind::clamped)
-        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seenBy(k), near.bound);
+        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seenBy(k), near.bound, near.core);
       else
-        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seenBy(k), near.bound);
+        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seenBy(k), near.bound, near.core);
     });
   });
 }

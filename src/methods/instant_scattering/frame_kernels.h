@@ -42,10 +42,13 @@ enum class EndKind { lambertian, isotropic, henyeyGreenstein };
 struct NearField {
   enum class Kind {
     clamped,  ///< min(G, bound)
-    spread    ///< the light is spread over a ball of 1 / sqrt(bound), its energy kept
+    spread    ///< the light is spread over a ball of 1 / sqrt(bound)
   };
+  static constexpr float kPlainCore = 7;
+
   Kind kind = Kind::clamped;
-  float bound = 1;  ///< [1/unit^2]
+  float bound = 1;          ///< [1/unit^2]
+  float core = kPlainCore;  ///< how bright the ball's middle is (spreadFalloff())
 };
 
 /// Where a table of optical depths looks from a point: all around or, from outside of the media, into the cone that
@@ -101,21 +104,22 @@ VIRGA_HD static inline float endScattering(float c, float g) {
 }
 
 /// What takes the place of 1 / d^2 within the radius 1 / sqrt(bound) of a light that is spread: with s = d^2 bound a
-/// polynomial that meets 1 / d^2 at s = 1 with the same slope, and whose integral over the ball is that of 1 / d^2.
-VIRGA_HD static inline float spreadFalloff(float d2, float bound) {
-  const float s = d2 * bound;
-  return s < 1 ? bound * (9 + s * (7 * s - 15)) : 1 / d2;
+/// polynomial that meets 1 / d^2 at s = 1 with the same slope. For a core of 7 its integral over the ball is that of
+/// 1 / d^2; coreFor() has others.
+VIRGA_HD static inline float spreadFalloff(float d2, float bound, float core) {
+  const float t = 1 - d2 * bound;
+  return t > 0 ? bound * (1 + t * (1 + t * core)) : 1 / d2;
 }
 
 /// Light at a receiver from the light at (x, y, z) from it, `inverse` over that distance: over the light's weight and
 /// what lies between them. `cr`: cosine at the receiver.
 template <EndKind light, EndKind receiver, NearField::Kind near>
 VIRGA_HD static inline float connected(const KernelLight& l, float x, float y, float z, float d2, float inverse,
-                                       float cr, float anisotropy, float bound) {
+                                       float cr, float anisotropy, float bound, float core) {
   const float cl = -(l.ax * x + l.ay * y + l.az * z) * inverse;
   const float cosines = endCosine<light>(cl) * endCosine<receiver>(cr);
   const float term = near == NearField::Kind::clamped ? std::fmin(cosines * (inverse * inverse), bound)
-                                                      : cosines * spreadFalloff(d2, bound);
+                                                      : cosines * spreadFalloff(d2, bound, core);
   return term * endScattering<light>(cl, l.anisotropy) * endScattering<receiver>(cr, anisotropy);
 }
 
@@ -250,8 +254,8 @@ struct TableBetween {
 
 /// One light, all receivers. `between`: SeenInArrays or SeenThrough.
 template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
-VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const Between between,
-                                   float bound) {
+VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const Between between, float bound,
+                                   float core) {
   const float* __restrict px = to.px;
   const float* __restrict py = to.py;
   const float* __restrict pz = to.pz;
@@ -265,7 +269,7 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
     const float inverse = 1 / std::sqrt(d2);
     const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
     const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
-    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound);
+    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound, core);
     const Seen seen = between.at(i, -x, -y, -z, d2 * inverse, inverse, cr);
     r[i] += value * seen.r * l.r;
     g[i] += value * seen.g * l.g;

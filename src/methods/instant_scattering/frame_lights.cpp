@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame_lights.h"
 
+#include "methods/instant_scattering/light_spacing.h"
 #include "methods/instant_scattering/light_visibility.h"
 #include "transport/media_walk.h"
 
@@ -14,7 +15,8 @@ Vec3 aside(const FrameLights::Light& light, const SceneView& view) {
 
 FrameLights::Light lightOf(const SceneView& view, const LightVertex& v, int walks) {
   const bool onSurface = v.kind == VertexKind::surface;
-  FrameLights::Light light{{}, EndKind::lambertian, &v, 1 / static_cast<float>(walks), v.surface < 0};
+  FrameLights::Light light{{}, EndKind::lambertian,   &v,           1 / static_cast<float>(walks),
+                           0,  NearField::kPlainCore, v.surface < 0};
   float g = 0;
   if (!onSurface) light.plain = plainPhase(view.media[v.medium].phaseAt(v.p), light.kind, g);
   const Vec3 axis = onSurface ? v.normal : v.wi;
@@ -24,6 +26,7 @@ FrameLights::Light lightOf(const SceneView& view, const LightVertex& v, int walk
 }
 
 Vec3 positionOf(const FrameLights::Light& l) { return {l.kernel.px, l.kernel.py, l.kernel.pz}; }
+float brightness(const FrameLights::Light& l) { return std::max(l.kernel.r, std::max(l.kernel.g, l.kernel.b)); }
 
 /// Lights of one kind, and by what they are chosen: their walk and the number of the vertex on it are their name.
 struct OfKind {
@@ -39,8 +42,8 @@ OfKind lightsOf(const SceneView& view, const VirtualLights& all, VertexKind kind
       if (v.kind != kind) continue;
       const FrameLights::Light l = lightOf(view, v, all.walks());
       found.lights.push_back(l);
-      found.candidates.push_back({static_cast<uint64_t>(walk) << 32 | static_cast<uint32_t>(v.depth), v.p,
-                                  std::max(l.kernel.r, std::max(l.kernel.g, l.kernel.b))});
+      found.candidates.push_back(
+          {static_cast<uint64_t>(walk) << 32 | static_cast<uint32_t>(v.depth), v.p, brightness(l)});
     }
   return found;
 }
@@ -53,6 +56,24 @@ std::vector<FrameLights::Light> chosenOf(const OfKind& all, LightChoice& choice,
     chosen.push_back(l);
   }
   return chosen;
+}
+
+/// Balls of the lights of one kind, by how they lie.
+void spread(const SceneView& view, std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
+  // Measured: docs/decisions/ims-frame-balls.md.
+  constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64, kDeepest = 6;
+  const bool inMedia = kind == VertexKind::medium;
+  const float times = inMedia ? kTimesInMedia : kTimesOnSurfaces;
+  std::vector<PlacedLight> places;
+  for (const FrameLights::Light& l : lights) places.push_back({positionOf(l), brightness(l)});
+  const std::vector<float> radii = radiiOfNeighbours(places, times, static_cast<int>(2 * times), inMedia ? 3 : 2);
+  for (size_t i = 0; i < lights.size(); ++i) {
+    const LightVertex& v = *lights[i].vertex;
+    const float radius = radii[i] > 0 ? radii[i] : otherwise;
+    lights[i].radius = radius;
+    if (inMedia)
+      lights[i].core = coreFor(std::min(kDeepest, radius * maxComponent(view.media[v.medium].sigmaTAt(v.p))));
+  }
 }
 
 }  // namespace
@@ -79,7 +100,12 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   lights_ = chosenOf(onSurfaces, kept.onSurfaces, surfaceShare, options.turn);
   const size_t mediaShare = std::max<size_t>(1, most - std::min(most - 1, lights_.size()));
   const std::vector<Light> more = chosenOf(inMedia, kept.inMedia, mediaShare, options.turn);
+  const size_t onSurface = lights_.size();
   lights_.insert(lights_.end(), more.begin(), more.end());
+  if (options.balls) {
+    spread(view, std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
+    spread(view, std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
+  }
   if (options.shadows == ShadowMapping::maps) {
     refuseTooManyMaps(lights_.size(), options.maps.resolution, "lights");
     std::vector<LightVertex> vertices;
@@ -92,21 +118,15 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   between_ = MediaBetween(scene, std::move(places), {}, stop);
 }
 
-float FrameLights::spacing() const {
+float FrameLights::medianRadius() const {
   const bool anyInMedia = !lights_.empty() && lights_.back().vertex->kind == VertexKind::medium;
-  std::vector<float> along[3];
-  for (const Light& l : lights_) {
-    if (anyInMedia && l.vertex->kind != VertexKind::medium) continue;
-    for (int axis = 0; axis < 3; ++axis) along[axis].push_back(positionOf(l)[axis]);
-  }
-  if (along[0].empty()) return 1;
-  const auto count = static_cast<float>(along[0].size());
-  float volume = 1;
-  for (std::vector<float>& a : along) {
-    std::sort(a.begin(), a.end());
-    volume *= a[a.size() * 19 / 20] - a[a.size() / 20];  // a few stray far
-  }
-  return std::cbrt(volume / count);
+  std::vector<float> radii;
+  for (const Light& l : lights_)
+    if (!anyInMedia || l.vertex->kind == VertexKind::medium) radii.push_back(l.radius);
+  if (radii.empty()) return 1;
+  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), middle, radii.end());
+  return *middle;
 }
 
 bool FrameLights::gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const {

@@ -20,6 +20,8 @@ class FrameLights {
     int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
     ShadowMapping shadows = ShadowMapping::maps;
     LightMaps::Options maps;
+    bool balls = true;  ///< each has a radius of its own
+    float radius = 1;   ///< of lights that have no neighbours [unit]
     float turn = 0.5f;  ///< in [0, 1): which ones
   };
   /// What the lights of a frame leave to those of the next one, if these are of the same walks among the same surfaces.
@@ -32,6 +34,8 @@ class FrameLights {
     EndKind kind;
     const LightVertex* vertex;  ///< in virtualLights()
     float share;                ///< by which the vertex's weight counts
+    float radius;               ///< of the ball that it is spread over, where the user gives none [unit]
+    float core;                 ///< NearField::core for that
     bool plain;  ///< the kernels know its bsdf or phase function; of others the kernel's light says only where they are
   };
 
@@ -46,8 +50,8 @@ class FrameLights {
   /// Those on surfaces, then those in media.
   const std::vector<Light>& lights() const { return lights_; }
 
-  /// Of the lights in media, or of all where there are none there: edge of the cube that each has for itself [unit].
-  float spacing() const;
+  /// Of the lights in media, or of all where there are none there [unit].
+  float medianRadius() const;
 
   /// Transmittance from light number i to receivers of a kind, for each channel; surfaces are looked at where there are
   /// shadow maps. `seen` points to three arrays of to.count values; on return the second and the third may be the same

@@ -30,7 +30,7 @@ inline constexpr SettingInfo kImsSettings[] = {
      "all"},
     {"paths", "0", "walks whose virtual lights all light a vertex on the eye ray (P); 0: single lights"},
     {"radius",
-     "0.3 times the scene's extent, or, without shapes, the mean free path; frame: twice the spacing of its lights",
+     "0.3 times the scene's extent, or, without shapes, the mean free path; frame: by its neighbours, for each light",
      "virtual lights that are nearer are clamped, and what that takes is compensated [unit]"},
     {"bound", "1 / radius^2", "the same as a bound of the geometry term, in place of the radius [1/unit^2]"},
     {"compensation", "path; frame: spread",

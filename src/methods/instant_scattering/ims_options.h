@@ -29,7 +29,7 @@ struct ImsOptions {
   GatherOptions gather;
   LightVisibilityOptions visibility;
   int frameLights = 1300;        ///< frame: virtual lights that are kept
-  ReceiverBatch::Options frame;  ///< frame: how receivers are lit; a bound of 0: as the lights lie
+  ReceiverBatch::Options frame;  ///< frame: how receivers are lit; a bound of 0: by how the lights lie
   Compensate compensate = Compensate::path;
   CompensationOptions compensation;
   Show show = Show::picture;

@@ -63,17 +63,19 @@ void ReceiverBatch::gather(const Scene& scene, const FrameLights& lights, const 
     for (Group& group : groups_) group.clearSums();
     for (; i < lights.lights().size() && lights.lights()[i].vertex->kind == kind; ++i) {
       const FrameLights::Light& from = lights.lights()[i];
+      NearField near = options.near;
+      if (!(near.bound > 0)) near = {near.kind, 1 / square(from.radius), from.core};
       for (Group& group : groups_) {
         if (group.px.empty()) continue;
         if (from.plain && group.plain && options.visibility == Visibility::maps &&
-            lights.gatherAtOnce(i, group.view(), group.kind, options.near))
+            lights.gatherAtOnce(i, group.view(), group.kind, near))
           continue;
         float* seen[3] = {group.seen[0].data(), group.seen[1].data(), group.seen[2].data()};
         look(scene, lights, i, group, options, seen);
         if (from.plain && group.plain)
-          gatherLight(from.kernel, from.kind, group.view(), group.kind, seen, options.near);
+          gatherLight(from.kernel, from.kind, group.view(), group.kind, seen, near);
         else
-          gatherSlowly(lights, i, scene.view, group, options.near, seen);
+          gatherSlowly(lights, i, scene.view, group, near, seen);
       }
     }
     for (const Group& group : groups_) distribute(group, kind, found);
@@ -112,7 +114,7 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
     const Vec3 w = way / std::sqrt(d2);
     const float cosine = generalCosine(vertex.normal, w), receiving = generalCosine(x.normal(), w);
     const float term = near.kind == NearField::Kind::spread
-                           ? cosine * kernels::spreadFalloff(d2, near.bound)
+                           ? cosine * kernels::spreadFalloff(d2, near.bound, near.core)
                            : cosine / d2 * (1 - clampedShareOf(cosine * receiving / d2, near.bound));
     // What plain receivers scatter apart from direction is in their throughput.
     const Rgb scattered = group.plain ? Rgb(plainScattering(group, n, w)) : x.scattering(w);

@@ -22,7 +22,7 @@ class ReceiverBatch {
  public:
   enum class Visibility { exact, none, maps };  ///< maps: as far as the lights have them
   struct Options {
-    NearField near;
+    NearField near;  ///< a bound of 0: each light has its own
     Visibility visibility = Visibility::exact;
   };
 

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "methods/instant_scattering/light_spacing.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+
+namespace virga {
+namespace {
+
+/// A balanced k-d tree (Bentley 1975): of each range the middle light divides the others along its widest axis.
+class NeighbourTree {
+ public:
+  struct Neighbour {
+    float d2;
+    float weight;
+
+    bool operator<(const Neighbour& other) const { return d2 < other.d2; }
+  };
+
+  explicit NeighbourTree(std::span<const PlacedLight> lights)
+      : lights_(lights.begin(), lights.end()), axes_(lights.size()) {
+    divide(0, lights_.size());
+  }
+
+  /// The `most` that are nearest to p, in order.
+  void nearest(Vec3 p, size_t most, std::vector<Neighbour>& found) const {
+    found.clear();
+    search(p, most, 0, lights_.size(), found);
+    std::sort_heap(found.begin(), found.end());
+  }
+
+ private:
+  void divide(size_t first, size_t last) {
+    if (last - first < 2) return;
+    Bounds box;
+    for (size_t i = first; i < last; ++i) box.extend(lights_[i].p);
+    const Vec3 e = box.extent();
+    const int axis = e.x > e.y ? (e.x > e.z ? 0 : 2) : (e.y > e.z ? 1 : 2);
+    const size_t middle = first + (last - first) / 2;
+    const auto at = [&](size_t i) { return lights_.begin() + static_cast<std::ptrdiff_t>(i); };
+    std::nth_element(at(first), at(middle), at(last),
+                     [&](const PlacedLight& a, const PlacedLight& b) { return a.p[axis] < b.p[axis]; });
+    axes_[middle] = static_cast<char>(axis);
+    divide(first, middle);
+    divide(middle + 1, last);
+  }
+
+  void search(Vec3 p, size_t most, size_t first, size_t last, std::vector<Neighbour>& found) const {
+    if (first >= last) return;
+    const size_t middle = first + (last - first) / 2;
+    const PlacedLight& light = lights_[middle];
+    add({lengthSquared(light.p - p), light.weight}, most, found);
+    const float way = p[axes_[middle]] - light.p[axes_[middle]];
+    const bool below = way < 0;
+    search(p, most, below ? first : middle + 1, below ? middle : last, found);
+    if (found.size() < most || way * way < found.front().d2)
+      search(p, most, below ? middle + 1 : first, below ? last : middle, found);
+  }
+
+  static void add(Neighbour n, size_t most, std::vector<Neighbour>& found) {
+    if (found.size() == most) {
+      if (!(n < found.front())) return;
+      std::pop_heap(found.begin(), found.end());
+      found.back() = n;
+    } else {
+      found.push_back(n);
+    }
+    std::push_heap(found.begin(), found.end());
+  }
+
+  std::vector<PlacedLight> lights_;
+  std::vector<char> axes_;
+};
+
+}  // namespace
+
+std::vector<float> radiiOfNeighbours(std::span<const PlacedLight> lights, float times, int most, int dimensions) {
+  std::vector<float> radii(lights.size());
+  const NeighbourTree tree(lights);
+  constexpr int64_t kGrain = 64;
+  const auto count = static_cast<int64_t>(lights.size());
+  parallelFor((count + kGrain - 1) / kGrain, 1, [&](int64_t group) {
+    std::vector<NeighbourTree::Neighbour> found;
+    for (int64_t i = group * kGrain; i < std::min(count, (group + 1) * kGrain); ++i) {
+      const PlacedLight& light = lights[static_cast<size_t>(i)];
+      tree.nearest(light.p, static_cast<size_t>(most), found);
+      const float wanted = times * light.weight;
+      float sum = 0, d2 = 0;
+      for (const auto& [distance2, weight] : found) {
+        sum += weight, d2 = distance2;
+        if (sum >= wanted) break;
+      }
+      const float missing = sum > 0 ? std::max(1.f, wanted / sum) : 1;
+      radii[static_cast<size_t>(i)] = std::sqrt(d2) * std::pow(missing, 1 / static_cast<float>(dimensions));
+    }
+  });
+  return radii;
+}
+
+float coreFor(float depth) {
+  constexpr int kSteps = 64;
+  float point = 0, edge = 0, core = 0;  // integrals over the ball, by the distance u from its middle
+  for (int i = 0; i < kSteps; ++i) {
+    const float u = (static_cast<float>(i) + 0.5f) / kSteps, t = 1 - u * u, through = std::exp(-depth * u);
+    point += through;
+    edge += through * u * u * (1 + t);
+    core += through * square(u * t);
+  }
+  return (point - edge) / core;
+}
+
+}  // namespace virga

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/vec.h"
+
+namespace virga {
+
+/// A light, as far as its neighbours count.
+struct PlacedLight {
+  Vec3 p;
+  float weight;  ///< >= 0
+};
+
+/// For each light the radius of the ball around it in which the lights, itself included, weigh `times` as much as it
+/// does [unit]. At most `most` neighbours are counted; fewer lights than asked for: as if they went on as densely, in a
+/// space of `dimensions`. 0 where all that are counted lie in one place.
+std::vector<float> radiiOfNeighbours(std::span<const PlacedLight> lights, float times, int most, int dimensions);
+
+/// NearField::core for which a ball whose radius is `depth` mean free paths of a medium sends as much light to the
+/// medium within it as its middle would through what lies between; 7 in vacuum. Error 1e-3.
+float coreFor(float depth);
+
+}  // namespace virga
