@@ -87,13 +87,14 @@ template <EndKind light, EndKind receiver, NearField::Kind near>
 __device__ void gatherOne(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
                           const KernelShadowMap& map, float bound) {
   float seen[3];
+  constexpr float core = NearField::kPlainCore;
   kernels::seenThroughFog({l.px, l.py, l.pz}, to, bound, &seen[0]);
   kernels::seenThroughTable({l.px, l.py, l.pz}, to, table, &seen[0]);
   kernels::seenThroughMap<receiver>(l, to, map, &seen[0]);
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenInArrays{seen, seen, seen}, bound);
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenInArrays{seen, seen, seen}, bound, core);
   using kernels::FogBetween, kernels::TableBetween;
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, FogBetween>{{bound}, map}, bound);
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, TableBetween>{{table}, map}, bound);
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, FogBetween>{{bound}, map}, bound, core);
+  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, TableBetween>{{table}, map}, bound, core);
 }
 
 /// A receiver each: all lights.

@@ -141,8 +141,8 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   const int maxDepth = options.path.maxDepth < 0 ? -1 : std::max(0, options.path.maxDepth - 2);
   const WalkOptions walk{options.walks, maxDepth, options.flights, options.aim};
   const bool keeps = options.retrace < 1 && WalkStore::keeps(id.index, options.walks);
-  VirtualLights traced =
-      keeps ? walks.lights(scene, walk, id, id.index, options.retrace, stop) : traceVirtualLights(scene, walk, id, stop);
+  VirtualLights traced = keeps ? walks.lights(scene, walk, id, id.index, options.retrace, stop)
+                               : traceVirtualLights(scene, walk, id, stop);
   if (stop.stop_requested()) return false;
   FrameLights::Options kept;
   kept.most = options.frameLights;

@@ -96,7 +96,7 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   const OfKind onSurfaces = lightsOf(view, virtualLights_, VertexKind::surface),
                inMedia = lightsOf(view, virtualLights_, VertexKind::medium);
   const auto most = static_cast<size_t>(options.most);
-  const size_t surfaceShare = std::max(most / 2, most - std::min(most, inMedia.lights.size()));
+  const size_t surfaceShare = std::max(std::max<size_t>(1, most / 2), most - std::min(most, inMedia.lights.size()));
   lights_ = chosenOf(onSurfaces, kept.onSurfaces, surfaceShare, options.turn);
   const size_t mediaShare = std::max<size_t>(1, most - std::min(most - 1, lights_.size()));
   const std::vector<Light> more = chosenOf(inMedia, kept.inMedia, mediaShare, options.turn);
