@@ -192,14 +192,14 @@ TEST_F(ImsOptionsTest, WalksThatFillTheMemoryAreRefused) {
   EXPECT_THROW(flaggedBiased(scene_, {{"walks", "300000000"}}), Error);
 }
 
-/// What `transmittance=mean` compensates from light between media, against exact transmittance.
-Difference meanAgainstExact(const brute::Grid& grid, double sigmaT) {
+/// What is compensated of light between media, against exact transmittance.
+Difference againstExact(const char* transmittance, const brute::Grid& grid, double sigmaT) {
   World w = denseFog();
   w.regions.pop_back();
   w.regions[0].medium.sigmaT = sigmaT;
   w.regions[0].medium.density = grid;
   const SceneSnapshot scene = sceneOf(elementsOf(w), ::testing::TempDir());
-  const auto found = [&](const char* transmittance, uint64_t seed) {
+  const auto found = [&](const char* way, uint64_t seed) {
     return estimates(scene, "ims",
                      {{"walks", "1024"},
                       {"radius", "0.8"},
@@ -207,11 +207,12 @@ Difference meanAgainstExact(const brute::Grid& grid, double sigmaT) {
                       {"levels", "1"},
                       {"ending", "nothing"},
                       {"show", "compensation"},
-                      {"transmittance", transmittance}},
+                      {"transmittance", way}},
                      {.sets = 32, .seed = seed});
   };
-  const Difference d = differenceOf(found("mean", 1), found("exact", 2), static_cast<size_t>(Layer::mediaToMedia));
-  fmt::print("local mean: {:+.1f} % of what is compensated, p {:.2g}\n", 100 * d.relative, d.p);
+  const Difference d =
+      differenceOf(found(transmittance, 1), found("exact", 2), static_cast<size_t>(Layer::mediaToMedia));
+  fmt::print("{}: {:+.1f} % of what is compensated, p {:.2g}\n", transmittance, 100 * d.relative, d.p);
   return d;
 }
 
@@ -220,10 +221,13 @@ TEST(ImsBias, TheLocalMeanIsNotTheTransmittanceBetweenSheets) {
     const double d = std::fmod(8 * x, 2) < 1 ? 1 : 0;
     return Vector{d, d, d};
   });
-  EXPECT_LT(meanAgainstExact(sheets, 12).p, kDisagree);
+  EXPECT_LT(againstExact("mean", sheets, 12).p, kDisagree);
+  const Difference found = againstExact("gradient", sheets, 12);  // and the gradient finds where it is not
+  EXPECT_GT(found.p, kDisagree);
+  EXPECT_LT(found.precision, 0.1);
 }
 TEST(ImsBias, TheLocalMeanIsTheTransmittanceOfAnEvenGrid) {
-  const Difference d = meanAgainstExact(gridOf(16, [](double, double, double) { return Vector{1, 1, 1}; }), 4);
+  const Difference d = againstExact("mean", gridOf(16, [](double, double, double) { return Vector{1, 1, 1}; }), 4);
   EXPECT_GT(d.p, kDisagree);
   EXPECT_LT(d.precision, 0.1);
 }

@@ -11,14 +11,17 @@ struct CompensationOptions {
   /// Beyond the last level: nothing; virtual lights with a bound that is kReducedClamping times as high; virtual lights
   /// without any.
   enum class Ending { nothing, reduced, unclamped };
+  /// To the new vertices: the true one; exp(-s t) with the local mean s in its place; this where extinction hardly
+  /// changes on the way, else the true one.
+  enum class Transmittance { exact, mean, gradient };
   static constexpr float kReducedClamping = 16;
 
   float radius = 0;  ///< [unit] 1 / sqrt(bound): clamping takes nothing from farther away
   int levels = -1;   ///< of recursion; -1: until Russian roulette ends it
   Ending ending = Ending::unclamped;
-  int vertices[2] = {1, 1};             ///< V_1, and V_2 for all deeper levels
-  GatherAmount amounts[2];              ///< P_1 and P_2: what lights each of these
-  bool localMeanTransmittance = false;  ///< exp(-s t) with the local mean s in place of the true one
+  int vertices[2] = {1, 1};  ///< V_1, and V_2 for all deeper levels
+  GatherAmount amounts[2];   ///< P_1 and P_2: what lights each of these
+  Transmittance transmittance = Transmittance::exact;
 };
 
 /// The recursive bias compensation of the paper (section 4.4): near a vertex x new vertices x' are sampled, with
@@ -100,12 +103,32 @@ class Compensation {
     const NearbyNumbers numbers{sampler.random2D(), sampler.random(), sampler.random2D(), sampler.random()};
     const auto isFree = [&](Vec3 w, float t) { return gatherer_.isFree(known, at.vertex.p, w, t); };
     const auto seen = [&](MediaRay& r, float end, float localMean) {
-      if (!options_.localMeanTransmittance) return passMedia(scene_, rays_, r, end, sampler.stream());
-      walkMedia(scene_, rays_, r, end, [](float, float) { return true; });  // for the media at its end
-      return Rgb(std::exp(-localMean * end));
+      return transmittance(r, end, localMean, sampler);
     };
     return nearby.find(at.vertex, at.throughput, numbers, isFree, seen, next.vertex, next.throughput);
   }
+
+  /// Section 4.4 of the paper names both: the local mean in place of the way, and the gradient of sigma_t to find where
+  /// that fails.
+  VIRGA_HD Rgb transmittance(MediaRay& r, float end, float localMean, Sampler& sampler) const {
+    using Choice = CompensationOptions::Transmittance;
+    if (options_.transmittance == Choice::exact) return passMedia(scene_, rays_, r, end, sampler.stream());
+    MediaRay atEnd = r;
+    walkMedia(scene_, rays_, atEnd, end, [](float, float) { return true; });
+    if (options_.transmittance == Choice::gradient && changes(atEnd, end, localMean))
+      return passMedia(scene_, rays_, r, end, sampler.stream());
+    r = atEnd;
+    return Rgb(std::exp(-localMean * end));
+  }
+  /// The gradient along the way is (sigma_t at its end - s) / t; over t it makes the optical depth wrong by t^2 / 2 of
+  /// that.
+  VIRGA_HD bool changes(const MediaRay& atEnd, float t, float s) const {
+    Rgb sigmaT;
+    for (int i = 0; i < atEnd.media.count(); ++i)
+      sigmaT += scene_.media[atEnd.media.medium(i)].sigmaTAt(atEnd.ray.at(t));
+    return std::fmax(maxComponent(sigmaT) - s, s - minComponent(sigmaT)) * t / 2 > kWrongDepth;
+  }
+  static constexpr float kWrongDepth = 0.02f;
 
   const SceneView& scene_;
   const Rays& rays_;

@@ -44,7 +44,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"p1", "0", "sampled: walks that light a vertex of the first level (P_1); 0: single lights"},
     {"p2", "0", "sampled: walks that light a vertex of further levels (P_2); 0: single lights"},
     {"transmittance", "exact",
-     "sampled: to the new vertices: exact, or from the local mean of the medium (biased, more at each level)"},
+     "sampled: to the new vertices: exact; mean: from the local mean of the medium (biased, more at each level); "
+     "gradient: that, but exact where extinction changes on the way (biased)"},
     {"visibility", "exact; frame: shadow_map",
      "of virtual lights: exact; minimum_depth: exact, without rays where nothing can be in the way (not in frames); "
      "shadow_map, none (biased)"},

@@ -16,7 +16,7 @@ namespace {
 constexpr std::string_view kMode[] = {"exact", "fast", "frame"};
 constexpr std::string_view kCompensate[] = {"path", "sampled", "none", "spread"};
 constexpr std::string_view kEnding[] = {"nothing", "reduced", "unclamped"};
-constexpr std::string_view kTransmittance[] = {"exact", "mean"};
+constexpr std::string_view kTransmittance[] = {"exact", "mean", "gradient"};
 constexpr std::string_view kVisibility[] = {"exact", "shadow_map", "minimum_depth", "none"};
 constexpr std::string_view kFlights[] = {"tracking", "marching"};
 constexpr std::string_view kShow[] = {"picture", "lost", "compensation"};
@@ -81,7 +81,7 @@ bool ImsOptions::biased() const {
   using Seen = LightVisibilityOptions::Mode;
   if (visibility.mode == Seen::shadowMap || visibility.mode == Seen::none) return true;
   if (compensate != Compensate::sampled) return false;
-  return compensation.localMeanTransmittance ||
+  return compensation.transmittance != CompensationOptions::Transmittance::exact ||
          (compensation.levels >= 0 && compensation.ending != CompensationOptions::Ending::unclamped);
 }
 
@@ -145,7 +145,8 @@ ImsSettings::ImsSettings(const Settings& settings) {
   c.vertices[1] = reader.integer("v2", 1).value_or(1);
   c.amounts[0].walks = reader.integer("p1", 0).value_or(0);
   c.amounts[1].walks = reader.integer("p2", 0).value_or(0);
-  c.localMeanTransmittance = reader.choice("transmittance", kTransmittance).value_or(0) == 1;
+  c.transmittance =
+      static_cast<CompensationOptions::Transmittance>(reader.choice("transmittance", kTransmittance).value_or(0));
   radius_ = reader.number("radius", 0);
   const std::optional<float> bound = reader.number("bound", 0);
   if (radius_ && bound) throw Error("--set ims.radius and ims.bound say the same: give one of them");
@@ -225,7 +226,7 @@ SettingValues valuesOf(const ImsOptions& o) {
           {"v2", std::to_string(c.vertices[1])},
           {"p1", std::to_string(c.amounts[0].walks)},
           {"p2", std::to_string(c.amounts[1].walks)},
-          {"transmittance", wordOf(kTransmittance, c.localMeanTransmittance ? 1 : 0)},
+          {"transmittance", wordOf(kTransmittance, c.transmittance)},
           {"visibility", wordOf(kVisibility, o.visibility.mode)},
           {"map_resolution", std::to_string(o.visibility.resolution)},
           {"map_points", std::to_string(o.visibility.points)},
