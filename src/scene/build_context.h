@@ -99,6 +99,8 @@ void buildEmitter(BuildContext&, const Node& emitter);
 void addAreaEmitter(BuildContext&, const Node& emitter, int surface, const BuiltShape&);
 /// Power of every emitter, once the scene's bounds are known [W].
 void chooseEmittersByPower(BuildContext&);
+/// LampStrength of every emitter.
+void measureLamps(BuildContext&);
 /// Steps of tracking are of the order of a mean free path: throws where the medium is so many of them thick that they
 /// drown in the rounding of distances.
 void requireTrackable(const SourcePosition& medium, float thickness);

@@ -162,6 +162,37 @@ double power(const EmitterView& e, float sceneRadius) {
   }
 }
 
+// Of light at infinity, the fluence; else intensity, where it is greatest. Relative to all others only.
+double strength(const EmitterView& e, bool flat) {
+  constexpr double pi = static_cast<double>(kPi);
+  const double v = 1e3 * static_cast<double>(mean(e.value * 1e-3f));
+  switch (e.kind) {
+    case EmitterView::Kind::area:
+      return v * static_cast<double>(e.area) * (flat ? 1 : 0.25);
+    case EmitterView::Kind::constant:
+    case EmitterView::Kind::environment:
+      return 4 * pi * v;
+    default:
+      return v;
+  }
+}
+
+LampStrength fromAfar(const EmitterView& e, const Scene::Parts& parts) {
+  LampStrength lamp;
+  lamp.infinite = e.infinite();
+  lamp.center = e.position;
+  if (e.kind == EmitterView::Kind::spot) lamp.axis = e.direction, lamp.least = std::cos(e.cutoffAngle);
+  if (e.kind != EmitterView::Kind::area) return lamp;
+  const auto index = static_cast<size_t>(e.shape);
+  const Bounds& bounds = parts.surfaceShapes[index]->bounds;
+  const ShapeView& shape = parts.surfaces[index];
+  lamp.center = bounds.center();
+  lamp.radius = 0.5f * length(bounds.extent());
+  lamp.flat = e.isRectangle || shape.kind == ShapeView::Kind::disk;
+  if (lamp.flat) lamp.axis = (e.isRectangle ? e.rectangle.normal : shape.normal) * shape.orientation;
+  return lamp;
+}
+
 }  // namespace
 
 void buildEmitter(BuildContext& context, const Node& node) {
@@ -215,6 +246,17 @@ void chooseEmittersByPower(BuildContext& context) {
   std::vector<float> shares;
   for (const double p : powers) shares.push_back(most > 0 ? static_cast<float>(p / most) : 0);
   context.parts.emitterChoice = Discrete(shares);
+}
+
+void measureLamps(BuildContext& context) {
+  std::vector<LampStrength>& lamps = context.parts.lamps;
+  std::vector<double> strengths;
+  for (const EmitterView& e : context.parts.emitters) {
+    lamps.push_back(fromAfar(e, context.parts));
+    strengths.push_back(strength(e, lamps.back().flat));
+  }
+  const double most = lamps.empty() ? 0 : *std::max_element(strengths.begin(), strengths.end());
+  for (size_t i = 0; i < lamps.size(); ++i) lamps[i].strength = most > 0 ? static_cast<float>(strengths[i] / most) : 0;
 }
 
 }  // namespace virga

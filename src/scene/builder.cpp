@@ -33,6 +33,7 @@ void linkViews(Scene& scene, const Scene::Parts& parts) {
   view.textures = viewOf(parts.textures);
   view.media = viewOf(parts.media);
   view.emitters = viewOf(parts.emitters);
+  view.lamps = viewOf(parts.lamps);
   view.emitterChoice = parts.emitterChoice.view();
   for (const ShapeView& s : parts.surfaces) view.thinGlass |= parts.bsdfs[static_cast<size_t>(s.bsdf)].front.isThin();
   for (const MediumView& m : parts.media) {
@@ -177,6 +178,7 @@ SceneSnapshot buildScene(const SceneDescription& description, const BuildOptions
   checkLimits(context);
   warnOfOverlaps(context);
   chooseEmittersByPower(context);
+  measureLamps(context);
   linkViews(*scene, *parts);
   warnOfDarkness(context);
   placeCamera(*scene);

@@ -113,6 +113,28 @@ struct EmitterView {
   }
 };
 
+/// An emitter from afar: how much light it sends where nothing is in its way, to within a small factor.
+struct LampStrength {
+  float strength = 0;     ///< fluence of lights at infinity, else radiant intensity; relative to the scene's strongest
+  bool infinite = false;  ///< the rest does not matter
+  Vec3 center;
+  float radius = 0;   ///< of a ball around it [unit]
+  Vec3 axis;          ///< unit: it shines to this side, or around it...
+  float least = -1;   ///< ...where the cosine is above this; -1: everywhere
+  bool flat = false;  ///< by the cosine
+
+  VIRGA_HD float fluenceAt(Vec3 p) const {
+    if (infinite) return strength;
+    constexpr float kAside = 0.1f;  // p may stand for places around it
+    const Vec3 way = p - center;
+    constexpr float kNear = 1e-15f;  // [unit] no sum of lamps overflows
+    const float d = std::fmax(length(way), std::fmax(radius, kNear));
+    const float cosine = dot(axis, way) / d;
+    const float toward = flat ? clamp(cosine + radius / d, kAside, 1) : (cosine > least ? 1 : kAside);
+    return strength * toward / (d * d);
+  }
+};
+
 /// A point on (or direction to) an emitter, as seen from a receiver.
 struct LightSample {
   Vec3 wi;             ///< unit, from the receiver to the light

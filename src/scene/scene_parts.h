@@ -61,6 +61,7 @@ struct Scene::Parts {
   std::vector<std::shared_ptr<const PhaseTable>> phaseTables;
   std::vector<std::shared_ptr<const BuiltMixture>> phaseMixtures;
   std::vector<EmitterView> emitters;
+  std::vector<LampStrength> lamps;
   Discrete emitterChoice;
 };
 

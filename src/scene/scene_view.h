@@ -52,6 +52,7 @@ struct SceneView {
   View<TextureView> textures;
   View<MediumView> media;
   View<EmitterView> emitters;
+  View<LampStrength> lamps;    ///< one for each emitter
   DiscreteView emitterChoice;  ///< by power
   bool chromatic = false;      ///< some medium's extinction differs between the channels
   bool thinGlass = false;      ///< some surface lets light straight through (Bsdf::isThin)

@@ -12,7 +12,8 @@ struct LampGuide {
   static constexpr float kMostShare = 0.5f;  ///< measured: docs/decisions/guided-directions.md
 
   int emitter = -1;  ///< -1: none was drawn
-  float choice = 0;  ///< probability of the emitter
+  float choice = 0;  ///< probability of the emitter...
+  Vec3 lampsFor;     ///< ...for the light at this place
   LightPoint on;     ///< of a lamp at a finite distance
   float share = 0;   ///< of the directions that are guided
   float even = 1;    ///< density of even directions [1/sr]

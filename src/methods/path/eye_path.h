@@ -28,10 +28,16 @@ struct EyePath {
   /// How the last vertex chose the ray's direction: what multiple importance sampling needs when the ray meets a light.
   struct LastVertex {
     Vec3 p;
+    Vec3 lampsFor;           ///< the place for whose light one of the lights was chosen
     float pdf = 0;           ///< [1/sr]
     bool connected = false;  ///< it sampled the lights too; not so the camera and specular vertices
     float t = 0;             ///< its place on `segment`, if that is active: it could have been found by technique B
     EquiangularSegment segment;
+  };
+  /// A light chosen before a flight, for a place on it.
+  struct AheadChoice {
+    EmitterChoice light;
+    Vec3 lampsFor;
   };
 
   /// A vertex, and what the path had carried to it.
@@ -60,7 +66,7 @@ struct EyePath {
   float bound = 0;               ///< of the virtual lights' geometry terms [1/unit^2]; 0: there are no virtual lights
   Link link;
   bool lightsX1 = true;           ///< lamps are connected at x1, too; no: somebody else finds their light there
-  EmitterChoice choice;           ///< of the light at the next vertex in a medium, where it is made before the flight
+  AheadChoice ahead;              ///< of the light at the next vertex in a medium, where it is made before the flight
   LampGuide lamp;                 ///< of the last vertex, for technique B on the next segment
   float promise = 1, before = 1;  ///< LampGuide::promise of the last direction and of the one before
 

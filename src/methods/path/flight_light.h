@@ -1,17 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "scene/lamp_choice.h"
 #include "transport/tabled_lamps.h"
 
 namespace virga {
-
-/// One of the scene's emitters, drawn at random.
-struct EmitterChoice {
-  int emitter = -1;
-  float probability = 0;
-
-  VIRGA_HD bool drawn() const { return emitter >= 0; }
-};
 
 /// What a free flight gathers of a lamp's light on its way.
 struct Gathered {

@@ -36,7 +36,8 @@ class LightTechniques {
     const MediumView& medium = scene_.media[index];
     if (!medium.homogeneous || !(medium.sigmaT > 0)) return {};
     const Rgb choice = path.throughput / (path.throughput.r + path.throughput.g + path.throughput.b);
-    return {index, largeLights, r.ray, t0, t1, medium.sigmaT, medium.grey, medium.spectrum, choice};
+    const Vec3 lampsFor = path.lamp.drawn() ? path.lamp.lampsFor : r.ray.o;
+    return {index, largeLights, r.ray, lampsFor, t0, t1, medium.sigmaT, medium.grey, medium.spectrum, choice};
   }
 
   /// Of the surroundings, where the path has left the scene.
@@ -44,8 +45,10 @@ class LightTechniques {
     if (scene_.environment < 0 || !lamps_) return;
     const EmitterView& emitter = scene_.emitters[scene_.environment];
     const Vec3 w = path.at.ray.d;
-    const float connection = scene_.emitterChoice.probability(scene_.environment) * environmentPdf(emitter, w);
-    path.addMet(environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection) : 1));
+    const auto connection = [&] {
+      return emitterProbability(scene_, path.last.lampsFor, scene_.environment) * environmentPdf(emitter, w);
+    };
+    path.addMet(environmentRadiance(emitter, w) * (path.last.connected ? weight(path.last.pdf, connection()) : 1));
   }
 
   /// Of the lamp, if it is one, that the path has met.
@@ -57,12 +60,13 @@ class LightTechniques {
     float w = 1;
     const EyePath::LastVertex& last = path.last;
     if (last.connected) {
-      const float choice = scene_.emitterChoice.probability(shape.emitter);
+      const float choice = emitterProbability(scene_, last.lampsFor, shape.emitter);
       const float connection = choice * areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
       if (last.segment.aimsAt(emitter)) {
         const float flight = last.segment.freeFlightPdf(last.t);
         const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
-        const float equiangular = choice * uniform * last.segment.pdf(point.p, last.t);
+        const float aimed = emitterProbability(scene_, last.segment.lampsFor, shape.emitter);
+        const float equiangular = aimed * uniform * last.segment.pdf(point.p, last.t);
         w = weight(flight * last.pdf, last.segment.replacesFlights(emitter) ? 0 : flight * connection, equiangular);
       } else {
         w = weight(last.pdf, connection);
@@ -71,12 +75,18 @@ class LightTechniques {
     path.addMet(emitter.radianceAt(lightUv(shape, emitter, point.p, hit.primitive, {hit.u, hit.v})) * w);
   }
 
-  /// Before a flight to a vertex in a medium: the light that is looked for there is chosen now, if a flight may gather
-  /// its light. (Two choices, one for flights and one at vertices, would leave more noise.)
-  VIRGA_HD Gathered beginFlight(Path& path, Sampler& sampler) const {
-    if (!flightLight_.any() || !hasLights()) return {};
-    path.choice = chooseEmitter(path, sampler);
-    return flightLight_.begin(path.choice, path.throughput);
+  /// The number that chooses a light before a flight, if a flight may gather its light; else below 0.
+  VIRGA_HD float numberForFlight(Path& path, Sampler& sampler) const {
+    path.ahead = {};
+    return flightLight_.any() && hasLights() ? path.one(sampler) : -1;
+  }
+  /// Before a flight to a vertex in a medium, which has [t0, t1] to itself: the light that is looked for there is
+  /// chosen now. (Two choices, one for flights and one at vertices, would leave more noise.)
+  VIRGA_HD Gathered beginFlight(Path& path, float number, float t0, float t1) const {
+    if (number < 0) return {};
+    const Vec3 middle = path.at.ray.at(t1 < kInfinity ? 0.5f * (t0 + t1) : t0);
+    path.ahead = {virga::chooseEmitter(scene_, middle, number), middle};
+    return flightLight_.begin(path.ahead.light, path.throughput);
   }
   VIRGA_HD const FlightLight<Rays>& flightLight() const { return flightLight_; }
   /// Light that a free flight has gathered on its way to a vertex in a medium.
@@ -90,7 +100,7 @@ class LightTechniques {
   VIRGA_HD void connectEquiangular(Path& path, const EquiangularSegment& segment, const MediaState& media,
                                    Sampler& sampler) const {
     if (!hasLights() || (!path.lightsX1 && !path.layers.hasX1())) return;
-    const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, sampler);
+    const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, segment.lampsFor, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
     const LightPoint& on = lamp.on;
     const float uDistance = path.one(sampler);
@@ -106,7 +116,7 @@ class LightTechniques {
     const PhaseFunction phase = medium.phaseAt(x);
     const float flight = segment.freeFlightPdf(distance.t);
     const float own = lamp.choice * distance.pdf * light.pdf;
-    const float connected = segment.replacesFlights(emitter) ? 0 : flight * lamp.choice;
+    const float connected = segment.replacesFlights(emitter) ? 0 : flight * emitterProbability(scene_, x, lamp.emitter);
     float w = 1;
     if (light.delta) {
       w = weight(own, connected);
@@ -127,7 +137,7 @@ class LightTechniques {
   VIRGA_HD void connectMedium(Path& path, const PhaseFunction& phase, const MediaState& media, Vec3 x, Vec3 wo,
                               Sampler& sampler) const {
     if (!connectsHere(path)) return;
-    const EmitterChoice choice = path.choice.drawn() ? path.choice : chooseEmitter(path, sampler);
+    const EmitterChoice choice = path.ahead.light.drawn() ? path.ahead.light : chooseEmitter(path, x, sampler);
     if (flightLight_.has(choice.emitter)) return;
     const Connection c = sampleConnection(path, x, choice, sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
@@ -139,7 +149,8 @@ class LightTechniques {
     if (segment.aimsAt(emitter)) {
       const Vec3 y = x + c.light.wi * c.light.distance;
       const float flight = segment.freeFlightPdf(path.last.t);
-      w = weight(flight * own, flight * phasePdf, c.choice * c.light.uniformPdf * segment.pdf(y, path.last.t));
+      const float aimed = emitterProbability(scene_, segment.lampsFor, c.emitter);
+      w = weight(flight * own, flight * phasePdf, aimed * c.light.uniformPdf * segment.pdf(y, path.last.t));
     }
     LayerPath layers = path.layers;
     const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, layers, sampler);
@@ -151,7 +162,7 @@ class LightTechniques {
                                Sampler& sampler) const {
     if (!connectsHere(path)) return;
     path.last.segment = {};
-    const Connection c = sampleConnection(path, point.p, chooseEmitter(path, sampler), sampler);
+    const Connection c = sampleConnection(path, point.p, chooseEmitter(path, point.p, sampler), sampler);
     if (!(c.light.pdf > 0) || isBlack(c.light.radiance)) return;
     const Vec3 wi = side.frame.toLocal(c.light.wi);
     const Rgb value = side.leaks(c.light.wi, wi) ? Rgb() : side.bsdf->value(side.wo, wi);
@@ -167,7 +178,7 @@ class LightTechniques {
   /// For a ray that leaves x into these media: it is guided where the lamp lies in the same fog, and not too deep.
   VIRGA_HD LampGuide guideFrom(const Path& path, const MediaState& media, Vec3 x, Sampler& sampler) const {
     if (!aims_ || media.count() != 1 || !hasLights()) return {};
-    LampGuide lamp = drawLamp(path, sampler);
+    LampGuide lamp = drawLamp(path, x, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
     const MediumView& fog = scene_.media[media.medium(0)];
     if (!emitter.isLocal() || emitter.medium != media.medium(0) || !fog.homogeneous) return lamp;
@@ -215,17 +226,16 @@ class LightTechniques {
     if (path.last.segment.replacesFlights(emitter)) return {};
     return {sampleLight(scene_, emitter, x, path.pair(sampler)), choice.emitter, choice.probability};
   }
-  VIRGA_HD EmitterChoice chooseEmitter(const Path& path, Sampler& sampler) const {
-    const auto choice = scene_.emitterChoice.sample(path.one(sampler));
-    return {choice.index, choice.probability};
+  VIRGA_HD EmitterChoice chooseEmitter(const Path& path, Vec3 x, Sampler& sampler) const {
+    return virga::chooseEmitter(scene_, x, path.one(sampler));
   }
 
-  VIRGA_HD LampGuide drawLamp(const Path& path, Sampler& sampler) const {
-    const EmitterChoice choice = chooseEmitter(path, sampler);
+  VIRGA_HD LampGuide drawLamp(const Path& path, Vec3 x, Sampler& sampler) const {
+    const EmitterChoice choice = chooseEmitter(path, x, sampler);
     const EmitterView& emitter = scene_.emitters[choice.emitter];
     const Vec2 u = path.pair(sampler);
     LampGuide lamp;
-    lamp.emitter = choice.emitter, lamp.choice = choice.probability;
+    lamp.emitter = choice.emitter, lamp.choice = choice.probability, lamp.lampsFor = x;
     if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
     return lamp;
   }

@@ -48,7 +48,7 @@ class PathTracer {
     Collision collision;
     SpectralFlight spectral(path.throughput, scene_.chromatic ? path.one(sampler) : 0.f);
     Gathered gathered;
-    if (mayScatter(path)) gathered = lights_.beginFlight(path, sampler);
+    const float chooses = mayScatter(path) ? lights_.numberForFlight(path, sampler) : -1;
     Rgb glow;
     bool first = true;
     walkMedia(scene_, rays_, walk, hit.found() ? hit.t : path.tMax, [&](float t0, float t1) {
@@ -56,6 +56,7 @@ class PathTracer {
       if (std::exchange(first, false)) {
         segment = lights_.equiangularSegment(path, walk, t0, t1);
         if (segment.active()) segmentMedia = walk.media;
+        gathered = lights_.beginFlight(path, chooses, t0, t1);
       }
       if (gathered.active())
         collision = lights_.flightLight().fly(walk, t0, t1, gathered, sampler.stream());
@@ -82,7 +83,7 @@ class PathTracer {
     path.link = {true, v.p, v.normal()};
     if (v.kind == VertexKind::medium) {
       path.throughput *= v.albedo;
-      return leaveMedium(path, v.phase, v.media, v.p, v.wo, {v.p, 0, true, 0, {}}, sampler);
+      return leaveMedium(path, v.phase, v.media, v.p, v.wo, {v.p, v.p, 0, true, 0, {}}, sampler);
     }
     const Side side{&v.surface.bsdf, v.surface.frame, v.surface.frame.toLocal(v.wo), v.surface.normal};
     path.at.ray.d = -v.wo;
@@ -103,7 +104,7 @@ class PathTracer {
     if (!path.survivesClamping(x, Vec3(0), sampler)) return false;
     if (path.record) path.writeDown(Vertex::inMedium(scene_, collision.medium, x, wo, media));
     path.throughput *= medium.albedoAt(x);
-    EyePath::LastVertex last{x, 0, true, collision.t, {}};
+    EyePath::LastVertex last{x, path.ahead.light.drawn() ? path.ahead.lampsFor : x, 0, true, collision.t, {}};
     if (segment.contains(collision.t) && collision.medium == segment.medium) last.segment = segment;
     return leaveMedium(path, medium.phaseAt(x), media, x, wo, last, sampler);
   }
@@ -202,7 +203,7 @@ class PathTracer {
     if (side.leaks(wi, s.wi)) return false;
     path.throughput *= s.weight;
     path.etaScale *= s.eta * s.eta;
-    path.last = {point.p, s.pdf, !s.specular, 0, {}};
+    path.last = {point.p, point.p, s.pdf, !s.specular, 0, {}};
     path.at = leaveSurface(scene_, point, wo, wi, media);
     path.tMax = kInfinity;
     ++path.depth;
