@@ -14,7 +14,8 @@ struct LampGuide {
   int emitter = -1;  ///< -1: none was drawn
   float choice = 0;  ///< probability of the emitter...
   Vec3 lampsFor;     ///< ...for the light at this place
-  LightPoint on;     ///< of a lamp at a finite distance
+  Vec2 place;        ///< what draws a point on it
+  LightPoint on;     ///< that point, of a lamp at a finite distance, whoever looks at it
   float share = 0;   ///< of the directions that are guided
   float even = 1;    ///< density of even directions [1/sr]
   Vec3 axis;         ///< unit, toward the point; 0 where nothing is to be guided

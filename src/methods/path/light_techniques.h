@@ -60,13 +60,12 @@ class LightTechniques {
     float w = 1;
     const EyePath::LastVertex& last = path.last;
     if (last.connected) {
-      const float choice = emitterProbability(scene_, last.lampsFor, shape.emitter);
-      const float connection = choice * areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
+      const float seen = areaLightPdf(shape, emitter, last.p, point.p, point.geometricNormal);
+      const float connection = emitterProbability(scene_, last.lampsFor, shape.emitter) * seen;
       if (last.segment.aimsAt(emitter)) {
         const float flight = last.segment.freeFlightPdf(last.t);
-        const float uniform = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
-        const float aimed = emitterProbability(scene_, last.segment.lampsFor, shape.emitter);
-        const float equiangular = aimed * uniform * last.segment.pdf(point.p, last.t);
+        const float perArea = uniformPointPdf(emitter, last.p, point.p, point.geometricNormal);
+        const float equiangular = aimPdf(last.segment, shape.emitter, point.p, last.t, seen, perArea);
         w = weight(flight * last.pdf, last.segment.replacesFlights(emitter) ? 0 : flight * connection, equiangular);
       } else {
         w = weight(last.pdf, connection);
@@ -102,13 +101,13 @@ class LightTechniques {
     if (!hasLights() || (!path.lightsX1 && !path.layers.hasX1())) return;
     const LampGuide lamp = path.lamp.drawn() ? path.lamp : drawLamp(path, segment.lampsFor, sampler);
     const EmitterView& emitter = scene_.emitters[lamp.emitter];
-    const LightPoint& on = lamp.on;
     const float uDistance = path.one(sampler);
     if (!segment.aimsAt(emitter)) return;
-    const EquiangularSegment::Sample distance = segment.sample(on.p, uDistance);
+    const bool atMiddle = aimsAtMiddle(emitter);
+    const EquiangularSegment::Sample distance = segment.sample(atMiddle ? middleOf(emitter) : lamp.on.p, uDistance);
     if (!(distance.pdf > 0)) return;
     const Vec3 x = segment.ray.at(distance.t), wo = -segment.ray.d;
-    const LightSample light = towardPoint(emitter, x, on);
+    const LightSample light = atMiddle ? sampleLight(scene_, emitter, x, lamp.place) : towardPoint(emitter, x, lamp.on);
     const float share = path.clampedShare(x, Vec3(0));
     if (!(light.pdf > 0) || !(share > 0) || isBlack(light.radiance)) return;
 
@@ -122,8 +121,10 @@ class LightTechniques {
       w = weight(own, connected);
     } else {
       const ShapeView& shape = scene_.surfaces[emitter.shape];
-      const float connection = connected > 0 ? areaLightPdf(shape, emitter, x, on.p, on.normal) : 0;
-      w = weight(own, connected * connection, flight * phase.pdf(wo, light.wi));
+      const auto connection = [&] {
+        return atMiddle ? light.pdf : areaLightPdf(shape, emitter, x, lamp.on.p, lamp.on.normal);
+      };
+      w = weight(own, connected > 0 ? connected * connection() : 0, flight * phase.pdf(wo, light.wi));
     }
     LayerPath layers = path.layers;
     layers.scatter(VertexKind::medium);
@@ -149,8 +150,8 @@ class LightTechniques {
     if (segment.aimsAt(emitter)) {
       const Vec3 y = x + c.light.wi * c.light.distance;
       const float flight = segment.freeFlightPdf(path.last.t);
-      const float aimed = emitterProbability(scene_, segment.lampsFor, c.emitter);
-      w = weight(flight * own, flight * phasePdf, aimed * c.light.uniformPdf * segment.pdf(y, path.last.t));
+      const float equiangular = aimPdf(segment, c.emitter, y, path.last.t, c.light.pdf, c.light.uniformPdf);
+      w = weight(flight * own, flight * phasePdf, equiangular);
     }
     LayerPath layers = path.layers;
     const Rgb seen = visibility({{x, c.light.wi}, media, 0}, x, c.light, layers, sampler);
@@ -205,6 +206,22 @@ class LightTechniques {
     return false;
   }
 
+  /// Technique B at a sphere: an equiangular distance about its middle, then a point as seen from there; points that
+  /// are chosen before lie on the far side half of the time.
+  VIRGA_HD bool aimsAtMiddle(const EmitterView& emitter) const {
+    if (emitter.kind != EmitterView::Kind::area) return false;
+    const ShapeView& shape = scene_.surfaces[emitter.shape];
+    return shape.kind == ShapeView::Kind::sphere && shape.orientation > 0;
+  }
+  VIRGA_HD Vec3 middleOf(const EmitterView& emitter) const { return scene_.surfaces[emitter.shape].center; }
+  /// Density with which technique B finds the vertex at t and from there the point `on` of an emitter [1/(sr unit)].
+  /// What is seen from there is chosen with the density `seen`, any point with `any` [1/sr].
+  VIRGA_HD float aimPdf(const EquiangularSegment& segment, int index, Vec3 on, float t, float seen, float any) const {
+    const EmitterView& emitter = scene_.emitters[index];
+    const float choice = emitterProbability(scene_, segment.lampsFor, index);
+    return choice * (aimsAtMiddle(emitter) ? seen * segment.pdf(middleOf(emitter), t) : any * segment.pdf(on, t));
+  }
+
   VIRGA_HD bool hasLights() const { return lamps_ && scene_.hasLamps(); }
   /// At a vertex that is in the path's layers already.
   VIRGA_HD bool connectsHere(const Path& path) const { return hasLights() && (path.lightsX1 || path.layers.hasX2()); }
@@ -235,7 +252,7 @@ class LightTechniques {
     const EmitterView& emitter = scene_.emitters[choice.emitter];
     const Vec2 u = path.pair(sampler);
     LampGuide lamp;
-    lamp.emitter = choice.emitter, lamp.choice = choice.probability, lamp.lampsFor = x;
+    lamp.emitter = choice.emitter, lamp.choice = choice.probability, lamp.lampsFor = x, lamp.place = u;
     if (emitter.isLocal()) lamp.on = sampleLightPoint(scene_, emitter, u);
     return lamp;
   }
