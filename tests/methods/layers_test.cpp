@@ -232,7 +232,7 @@ std::string pointAt(const std::string& place) {
   return R"(<emitter type="point"><point name="position" )" + place + R"(<rgb name="intensity" value="5"/></emitter>)";
 }
 std::string smallSphereAt(const std::string& place) {
-  const double radius = 0.005;  // a larger one keeps fog from where the point's light is brightest
+  const double radius = 0.0005;  // light that starts at its surface has so much less fog before it
   return fmt::format(R"(<shape type="sphere"><point name="center" {}<float name="radius" value="{}"/>
     <emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>)",
                      place, radius, 5 / (M_PI * radius * radius));
