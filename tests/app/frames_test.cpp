@@ -172,7 +172,11 @@ TEST_F(Sequence, WrongUseIsRefusedBeforeAnythingIsRendered) {
   scratch_.write("still.xml", R"(<scene version="3.0.0"><sensor type="perspective"/></scene>)");
   const Ended still = run({"render", "still.xml", "--frames", "1..2"});
   EXPECT_EQ(still.exitCode, 1);
-  EXPECT_NE(still.err.find("$frame"), std::string::npos) << still.err;
+  EXPECT_NE(
+      still.err.find("still.xml:1:2: error: all frames would be the same picture: nothing in this scene uses $frame"),
+      std::string::npos)
+      << still.err;
+  EXPECT_EQ(still.err.find("-D"), std::string::npos) << "what nobody wrote: " << still.err;
   EXPECT_EQ(scratch_.files(), (Names{"moving.xml", "smoke.0001.vol", "smoke.0002.vol", "smoke.0003.vol", "still.xml"}));
 }
 
