@@ -5,6 +5,9 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "methods/ims_checks.h"
 #include "transport/defence.h"
 #include "transport/kept_walks.h"
@@ -152,6 +155,32 @@ TEST(ImsSequence, FramesOfSmokeThatMovesIntoEmptySpace) {
 }
 TEST(ImsSequence, FramesOfWhichAQuarterIsTracedAnew) {
   expectFramesAgree({"frame, a quarter", creeping(), "0.25", kFramePowers, kFrame, Layer::mediaToSurface}, 3);
+}
+
+// Wherever in a pass the stop comes, what the pass had begun to keep is made anew: the frames are those of a session
+// that nothing stopped.
+TEST(ImsSequence, PassesThatWereStoppedChangeNothing) {
+  const std::vector<SceneSnapshot> frames = creeping();
+  const auto lastFrame = [&](const SettingValues& settings, bool stopped) {
+    RenderSession session(frames[0], findMethod("ims"), {.settings = {.values = settings, .seed = 7}});
+    for (size_t i = 0; i < frames.size(); ++i) {
+      if (i > 0) session.nextFrame(frames[i], differences(frames[i - 1]->description, frames[i]->description));
+      for (int ms = 0; stopped && ms < 8; ++ms) {
+        std::stop_source stop;
+        std::jthread timer([&] {
+          std::this_thread::sleep_for(std::chrono::milliseconds(ms));
+          stop.request_stop();
+        });
+        if (session.passes() < 2) session.step({}, stop.get_token());
+      }
+      while (session.passes() < 2) session.step();
+    }
+    return session.film().beauty();
+  };
+  for (SettingValues settings : {kExact, kFast, kFrame}) {
+    settings["retrace"] = "0.25";
+    EXPECT_EQ(largestDifference(lastFrame(settings, true), lastFrame(settings, false)), 0) << settings["mode"];
+  }
 }
 
 }  // namespace
