@@ -124,11 +124,14 @@ TEST_F(KeptWalksTest, CarryWhatFreshOnesCarryWhateverTheMediaBecome) {
     const char* what;
     SceneSnapshot before, after;
     double precision;
+    int later = 1;      ///< frames after the change
+    float retrace = 0;  ///< in each
   };
   const Case cases[] = {
       {"the same", room(stripes), room(stripes), 0.02},
       {"in place", room(stripes), room([](Vec3 p) { return 1.5f - stripes(p); }), 0.03},
       {"into empty space", room(left), room(moved), 0.04},
+      {"the same, half of them traced anew", room(left), room(moved), 0.04, 2, 0.25f},
       {"out of nothing", room(none), room(stripes), 0.03},
       {"vanishing", room(stripes), room(none), 0.02},
       {"another colour, another albedo", room(stripes, "0.6, 0.6, 1.2", 0.1), room(stripes, "1.2, 0.5, 0", 0.9), 0.03},
@@ -140,7 +143,8 @@ TEST_F(KeptWalksTest, CarryWhatFreshOnesCarryWhateverTheMediaBecome) {
     const Moments kept = momentsOf(kSets, ++seed, [&](const SampleId& id) {
       KeptWalks walks;
       walks.lights(*c.before, kWalks, id, 0, 0);
-      return walks.lights(*c.after, kWalks, id, 1, 0);
+      for (int frame = 1; frame < c.later; ++frame) walks.lights(*c.after, kWalks, id, frame, c.retrace);
+      return walks.lights(*c.after, kWalks, id, c.later, c.retrace);
     });
     const Moments stale =
         momentsOf(kSets, ++seed, [&](const SampleId& id) { return KeptWalks().lights(*c.before, kWalks, id, 0, 0); });
