@@ -52,12 +52,12 @@ TEST(LampChoice, IsDrawnWithItsProbability) {
 
 TEST(LampChoice, FollowsTheLight) {
   const SceneSnapshot scene = fourLampsAndADarkOne();
-  // At the origin the fluences are 100 / 16, 20 / 4, 4 pi / 10 and 50 * 0.04 / 4.
+  // At the origin they send 100 / 16, 20 / 4, pi / 10 and 50 * 0.04 / 4.
   const std::vector<double> middle = sharesAt(scene->view, {0, 0, 0});
-  const double sum = 100. / 16 + 20. / 4 + 0.4 * 3.14159265 + 50 * 0.04 / 4;
+  const double sum = 100. / 16 + 20. / 4 + 0.1 * 3.14159265 + 50 * 0.04 / 4;
   EXPECT_NEAR(middle[point], 0.75 * (100. / 16) / sum + 0.0625, 1e-3);
   EXPECT_NEAR(middle[spot], 0.75 * (20. / 4) / sum + 0.0625, 1e-3);
-  EXPECT_NEAR(middle[sky], 0.75 * (0.4 * 3.14159265) / sum + 0.0625, 1e-3);
+  EXPECT_NEAR(middle[sky], 0.75 * (0.1 * 3.14159265) / sum + 0.0625, 1e-3);
   EXPECT_NEAR(middle[panel], 0.75 * (50 * 0.04 / 4) / sum + 0.0625, 1e-2);
   EXPECT_GT(sharesAt(scene->view, {3.9f, 0, 0})[point], 0.8) << "beside the point light";
   EXPECT_GT(sharesAt(scene->view, {0, 1.9f, 0})[spot], 0.8) << "in the beam";
