@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <random>
 
+#include "image/scratch.h"
+
 namespace virga::testing {
 
 using brute::Grid;
@@ -60,7 +62,7 @@ Finding compared(const Picture& picture, const Picture& truth, Layer layer) {
 
 Picture pictureByPath(const std::string& elements, uint64_t seed, int passes) {
   const RenderSession session =
-      rendered(sceneOf(elements, ::testing::TempDir()), {.passes = passes, .seed = seed, .layers = LayerMask::all()});
+      rendered(sceneOf(elements), {.passes = passes, .seed = seed, .layers = LayerMask::all()});
   Picture picture(static_cast<size_t>(session.film().width() * session.film().height()));
   for (size_t l = 0; l < kLayerCount; ++l) {
     const Image image = session.film().layer(static_cast<Layer>(l));
@@ -72,8 +74,7 @@ Picture pictureByPath(const std::string& elements, uint64_t seed, int passes) {
 }
 
 std::string elementsOf(const brute::World& world) {
-  return brute::sceneElements(world, ::testing::TempDir(),
-                              ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  return brute::sceneElements(world, scratchFile("").string(), "world");
 }
 
 Picture brighter(Picture picture, Layer layer, double factor) {

@@ -40,7 +40,7 @@ Finding compared(const Picture& picture, Layer layer, const Picture& truth, Laye
 Finding compared(const Picture& picture, const Picture& truth, Layer layer);
 
 Picture pictureByPath(const std::string& elements, uint64_t seed = 1, int passes = thorough(Effort{}.passes));
-/// The world in a scene file; its grids are written beside it, under the name of the test.
+/// The world in a scene file; its grids are in files that the next world overwrites.
 std::string elementsOf(const brute::World& world);
 
 inline constexpr double kNoticed = 7;
