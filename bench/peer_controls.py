@@ -39,8 +39,8 @@ def scaled(what, path, factor):
 # Where media a tenth denser are not to be seen, or are not what the scene is for.
 OWN = {
     "conductor": scaled("mirror 10 % darker", ".//bsdf[@type='conductor']/rgb[@name='specular_reflectance']", 0.9),
-    "dielectric": scaled("index 1.54 instead of 1.4", ".//bsdf[@type='dielectric']/float[@name='int_ior']", 1.1),
-    "grid-lamps": denser(25),
+    "dielectric": scaled("index 1.75 instead of 1.4", ".//bsdf[@type='dielectric']/float[@name='int_ior']", 1.25),
+    "grid-lamps": denser(60),
     "mesh-medium": denser(25),
     "roughconductor": scaled("a quarter smoother", ".//bsdf/float[@name='alpha']", 0.75),
     "roughdielectric": scaled("index 1.54 instead of 1.4", ".//bsdf/float[@name='int_ior']", 1.1),

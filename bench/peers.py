@@ -20,10 +20,10 @@ import json
 import math
 import pathlib
 import re
+import resource
 import shutil
 import subprocess
 import sys
-import time
 
 import numpy as np
 
@@ -74,14 +74,19 @@ def run_mitsuba(scene, options):
     return np.load(target), float(done.stdout.split()[-1])
 
 
+def cpu_seconds_of_children():
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def run_virga(scene, options):
     pictures, seconds = [], 0
     for seed in range(options.first_seed, options.first_seed + options.replicates):
         picture = OUT / f"{scene.stem}-virga.exr"
         command = [options.virga, "render", scene, "--spp", options.spp, "--seed", seed, "-o", picture, "--quiet"]
-        start = time.monotonic()
+        before = cpu_seconds_of_children()
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-        seconds += time.monotonic() - start
+        seconds += cpu_seconds_of_children() - before
         if done.returncode != 0:
             first = next((line for line in done.stderr.splitlines() if "error:" in line), f"exit code {done.returncode}")
             raise Refused(first.split("error: ")[-1].replace(f"{OUT}/", ""))
@@ -152,10 +157,10 @@ def document(rows, named, options):
              f"differ, {counts['refused']} refused. The largest standard error of a bias is {100 * spread:.2f} %: four times that "
              f"would be found in every scene. Each scene has a wrong twin, which Virga renders with the same seeds: {noticed} of them "
              "differ from Mitsuba's picture of the right one.", "",
-             "| scene | | bias of the mean | p | p of blocks | wrong twin: its smallest p | relMSE (of noise) | Virga [s] | Mitsuba [s] |",
+             "| scene | | bias of the mean | p | p of blocks | wrong twin: its smallest p | relMSE (of noise) | Virga [CPU s] | Mitsuba [CPU s] |",
              "| --- | --- | --- | --- | --- | --- | --- | --- | --- |"]
     lines += [table_row(row) for row in rows]
-    lines += ["", "Seconds are wall-clock seconds of all replicates on one machine, Virga's with program start and scene loading; "
+    lines += ["", "Seconds are CPU seconds of all replicates on one machine, Virga's with program start and scene loading; "
               "scenes this small say little about speed.", ""]
     target = ROOT / "docs/results/peers.md"
     target.parent.mkdir(exist_ok=True)
