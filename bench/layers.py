@@ -67,7 +67,7 @@ def read(text):
 
 def scene_name(test):
     """Words, of a test's name."""
-    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", test.replace("AndWhatIsWrongInIt", "")).lower()
+    words = re.sub(r"(?<=\w)(?=[A-Z])", " ", test.replace("AndWhatIsWrongInIt", "")).lower()
     return words.replace("is a ", "as a ").replace("are a ", "as a ")
 
 
