@@ -322,9 +322,9 @@ TEST(Layers, DirectionalLightIsAFarSphere) {
 }
 
 // A small disk shines with the cosine of the angle, and nested spots, each of which falls off between two angles, add
-// up to the cosine's interpolation. Light that fog scatters back to the disk ends there, but passes the spots: in the midst
-// of the fog a radius of 0.05 takes 2 % more from media_to_media than one of 0.005 does. Outside of the picture, like
-// the point above.
+// up to the cosine's interpolation. Light that fog scatters back to the disk ends there, but passes the spots: in the
+// midst of the fog a radius of 0.05 takes 2 % more from media_to_media than one of 0.005 does. Outside of the picture,
+// like the point above.
 TEST(Layers, SpotsAreASmallDisk) {
   World world = glossyInFog();
   world.spheres.erase(world.spheres.begin());
