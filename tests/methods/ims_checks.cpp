@@ -154,7 +154,7 @@ void expectPower(const Estimates& a, const Estimates& truth, const std::vector<P
 
 void expectImsIsPath(const std::string& elements, const std::vector<Power>& powers, const Trials& trials,
                      const SettingsGrid& grid) {
-  const SceneSnapshot scene = sceneOf(elements, ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elements);
   const Estimates truth =
       estimates(scene, "path", {}, {.sets = 3 * trials.sets, .passes = trials.passes, .seed = trials.seed});
   Estimates all;

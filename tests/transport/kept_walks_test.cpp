@@ -6,13 +6,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 #include "transport/defence.h"
@@ -26,12 +26,6 @@ using Density = std::function<float(Vec3)>;
 
 class KeptWalksTest : public ::testing::Test {
  protected:
-  KeptWalksTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) / fmt::format("virga_kept_walks_{}", ::getpid())) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~KeptWalksTest() override { std::filesystem::remove_all(folder_); }
-
   /// A room with a lamp, smoke in its middle and, in a corner that overlaps it, coloured fog.
   SceneSnapshot room(const Density& density, const std::string& fog = "0.3, 0.6, 1.2", double albedo = 0.8) {
     constexpr int kSize = 10;
@@ -57,11 +51,11 @@ class KeptWalksTest : public ::testing::Test {
       <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{}"/><float name="albedo" value="0.9"/>
       </medium></shape>)",
                     albedo, name, fog),
-        folder_.string());
+        folder_.path().string());
   }
 
  private:
-  std::filesystem::path folder_;
+  ScratchFolder folder_;
   int files_ = 0;
 };
 
