@@ -99,6 +99,47 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
   EXPECT_NEAR(sum, truth, 2e-3 * truth);
 }
 
+// Four places find the light of dense fog, wherever the lamp is: within it, beside it, or far from it.
+TEST(FrameKernels, FourPlacesAreEnoughInDenseFog) {
+  constexpr int kPlaces = 4;
+  for (const bool within : {false, true})
+    for (const float sigmaT : {0.3f, 1.f, 3.f, 10.f, 30.f}) {
+      FogRays fog{};
+      for (int i = 0; i < RayPacket::kSize; ++i) {
+        fog.dz[i] = 1, fog.t0[i] = 3, fog.t1[i] = 5;
+        for (auto& channel : fog.sigmaT) channel[i] = sigmaT;
+      }
+      LampPoint lamp;
+      lamp.known = true, lamp.all = 1, lamp.medium = within ? 0 : -1;
+      for (const float z : within ? std::vector<float>{4} : std::vector<float>{0, 4, 8}) {
+        lamp.pz = z;
+        for (int i = 0; i < RayPacket::kSize; ++i) fog.ox[i] = 0.02f + 0.05f * static_cast<float>(i);
+        double found[RayPacket::kSize] = {};
+        const auto leftBy = [&](double d) { return within ? std::exp(-double{sigmaT} * d) : 1; };
+        for (int n = 0; n < kPlaces; ++n) {
+          KernelPlaces at;
+          RayPacket rays;
+          float value[3][RayPacket::kSize];
+          lightFog(lamp, fog, (static_cast<float>(n) + 0.5f) / kPlaces, 5, at, value, rays);
+          for (int i = 0; i < RayPacket::kSize; ++i) {
+            const auto x = double{at.px[i]}, y = double{at.pz[i]} - double{z};
+            found[i] += double{value[1][i]} * leftBy(std::sqrt(x * x + y * y)) / kPlaces;
+          }
+        }
+        for (int i = 0; i < RayPacket::kSize; ++i) {
+          double truth = 0;
+          constexpr int kSteps = 20000;
+          for (int k = 0; k < kSteps; ++k) {
+            const double t = 2 * (k + 0.5) / kSteps, x = double{fog.ox[i]}, y = 3 + t - double{z}, d2 = x * x + y * y;
+            truth += double{sigmaT} * std::exp(-double{sigmaT} * t) * leftBy(std::sqrt(d2)) / (4 * 3.14159265 * d2) *
+                     2 / kSteps;
+          }
+          EXPECT_NEAR(found[i] / truth, 1, 0.05) << within << ' ' << sigmaT << ' ' << z << ' ' << i;
+        }
+      }
+    }
+}
+
 TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {
   DenseVolume volume = makeProcedural(ProceduralKind::smoke, {.resolution = 32});
   const auto grid = Grid::dense(volume.nx, volume.ny, volume.nz, std::move(volume.values), {});
