@@ -99,7 +99,7 @@ void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scal
               float (*value)[RayPacket::kSize], RayPacket& rays) {
   kernels::lampInFog(lamp, fog, place, at, value);
   bool dense = false;
-  for (int i = 0; i < RayPacket::kSize; ++i) dense |= kernels::thickest(fog, i) > kernels::kDenseFog;
+  for (int i = 0; i < RayPacket::kSize; ++i) dense |= kernels::isDense(lamp, fog, i);
   if (dense) {
     kernels::FogProfile profile;
     kernels::profileFog(lamp, fog, profile);

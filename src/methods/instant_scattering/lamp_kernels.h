@@ -93,6 +93,8 @@ VIRGA_HD static inline void lampInMedia(const LampPoint& lamp, const KernelPlace
   }
 }
 
+// Loops over rays take vectors only where all that they call is inlined early: hence the attribute.
+
 /// A ray through fog as seen from a lamp. Distances [unit] along it count from where it enters the fog.
 struct LitRay {
   float foot, height;  ///< of the lamp: along the ray, from its origin, and beside it
@@ -101,14 +103,14 @@ struct LitRay {
   float range;         ///< angle that it fills [rad]
 
   /// Distance at a share of that angle: tan(a + b) - tan(a), over one denominator (Kulla and Fajardo 2012).
-  VIRGA_HD inline float distanceAt(float share) const {
+  [[gnu::always_inline]] VIRGA_HD inline float distanceAt(float share) const {
     const float angle = share * range, s = sineOf(angle), c = cosineOf(angle);
     const float along = s * (height * height + start * start) / std::fmax(height * c - start * s, 1e-20f);
     return std::fmin(std::fmax(along, 0.f), whole);
   }
   VIRGA_HD inline float squareTo(float in) const { return height * height + (start + in) * (start + in); }
 };
-VIRGA_HD static inline LitRay litRay(const LampPoint& lamp, const FogRays& ray, int i) {
+[[gnu::always_inline]] VIRGA_HD static inline LitRay litRay(const LampPoint& lamp, const FogRays& ray, int i) {
   const float x = lamp.px - ray.ox[i], y = lamp.py - ray.oy[i], z = lamp.pz - ray.oz[i];
   const float foot = x * ray.dx[i] + y * ray.dy[i] + z * ray.dz[i];
   const float ex = x - ray.dx[i] * foot, ey = y - ray.dy[i] * foot, ez = z - ray.dz[i] * foot;
@@ -117,8 +119,8 @@ VIRGA_HD static inline LitRay litRay(const LampPoint& lamp, const FogRays& ray, 
   return {foot, height, ex, ey, ez, start, whole, angleOf(height * whole, height * height + start * (start + whole))};
 }
 /// Cosine at the lamp times phase function at a distance along a ray [1/sr].
-VIRGA_HD static inline float scatteredAt(const LampPoint& lamp, const FogRays& ray, const LitRay& lit, float in,
-                                         int i) {
+[[gnu::always_inline]] VIRGA_HD static inline float scatteredAt(const LampPoint& lamp, const FogRays& ray,
+                                                                const LitRay& lit, float in, int i) {
   const float from = lit.start + in, inverse = 1 / std::sqrt(lit.squareTo(in));
   const float cosine =
       lampCosine(lamp, ray.dx[i] * from - lit.ex, ray.dy[i] * from - lit.ey, ray.dz[i] * from - lit.ez, inverse);
@@ -145,12 +147,16 @@ VIRGA_HD static inline void lampInFog(const LampPoint& lamp, const FogRays& ray,
     const float light = scatteredAt(lamp, ray, lit, in, i) * lit.range / lit.height;
     at.px[i] = ray.ox[i] + ray.dx[i] * t, at.py[i] = ray.oy[i] + ray.dy[i] * t, at.pz[i] = ray.oz[i] + ray.dz[i] * t;
     for (int channel = 0; channel < 3; ++channel)
-      value[channel][i] = light * ray.sigmaT[channel][i] * std::exp(-ray.sigmaT[channel][i] * in);
+      value[channel][i] = light * ray.sigmaT[channel][i] * falling(ray.sigmaT[channel][i] * in);
   }
 }
 
-/// Fog whose stretch is optically thicker than this is dense: there the angle alone does not say where the light is.
-constexpr float kDenseFog = 1;
+/// Is the angle not enough to say where the light is? From a lamp in the same fog it is for longer: far from it there
+/// is less light to be found.
+VIRGA_HD static inline bool isDense(const LampPoint& lamp, const FogRays& ray, int i) {
+  constexpr float kWithin = 4, kOutside = 1;  // optical depth
+  return thickest(ray, i) > (ray.medium[i] == lamp.medium ? kWithin : kOutside);
+}
 /// Light along rays through dense fog, at some places in order.
 struct FogProfile {
   static constexpr int kAngles = 8, kDepths = 8, kPlaces = kAngles + kDepths;
@@ -244,12 +250,12 @@ VIRGA_HD static inline void lampInDenseFog(const LampPoint& lamp, const FogRays&
     const LitRay lit = litRay(lamp, ray, i);
     const float scattered = scatteredAt(lamp, ray, lit, in, i) * part.all[i];
     const float light = density > 0 ? scattered / (density * lit.squareTo(in)) : 0.f;
-    const bool dense = thickest(ray, i) > kDenseFog;
+    const bool dense = isDense(lamp, ray, i);
     at.px[i] = dense ? ray.ox[i] + ray.dx[i] * t : at.px[i];
     at.py[i] = dense ? ray.oy[i] + ray.dy[i] * t : at.py[i];
     at.pz[i] = dense ? ray.oz[i] + ray.dz[i] * t : at.pz[i];
     for (int c = 0; c < 3; ++c) {
-      const float own = light * ray.sigmaT[c][i] * std::exp(-ray.sigmaT[c][i] * in);
+      const float own = light * ray.sigmaT[c][i] * falling(ray.sigmaT[c][i] * in);
       value[c][i] = dense ? own : value[c][i];
     }
   }

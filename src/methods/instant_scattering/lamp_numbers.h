@@ -130,7 +130,7 @@ struct FixedNumbers {
   /// directions.
   VIRGA_HD Vec2 placeInSky(int k, int count) const {
     const auto n = static_cast<float>(5 * k % count);
-    return {turned((n + 0.5f) / static_cast<float>(count), 0.7320508f), turned(0.75f + n * 0.6180340f, 0.3166248f)};
+    return {turned((n + 0.5f) / static_cast<float>(count), 0.7320508f), turned(n * 0.6180340f, 0.3166248f)};
   }
   static constexpr struct {
     float x, y;
