@@ -50,6 +50,11 @@ def relative_error(a, b):
     return float(((mean_a - mean_b) ** 2 * weight).mean()), float((noise * weight).mean())
 
 
+def noise_of(pictures):
+    """relMSE of one picture against the mean of many like it."""
+    return float((pictures.var(axis=0, ddof=1) / (pictures.mean(axis=0) ** 2 + 0.01)).mean())
+
+
 def agreement(virga, mitsuba):
     """Of arrays (replicate, row, column, channel)."""
     inner = (slice(None), slice(MARGIN, -MARGIN), slice(MARGIN, -MARGIN))
@@ -62,4 +67,4 @@ def agreement(virga, mitsuba):
             "channel_bias": [float(x) for x in channels_v.mean(axis=0) / channels_m.mean(axis=0) - 1],
             "p": float(sidak(welch(channels_v[:, c], channels_m[:, c]) for c in range(3))),
             "p_blocks": float(sidak(welch(a, b) for a, b in zip(blocks_of(v), blocks_of(m)))),
-            "relmse": relmse, "relmse_noise": noise}
+            "relmse": relmse, "relmse_noise": noise, "noise_virga": noise_of(v), "noise_mitsuba": noise_of(m)}

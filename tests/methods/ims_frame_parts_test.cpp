@@ -86,7 +86,7 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
   KernelPlaces at;
   RayPacket rays;
   float value[3][RayPacket::kSize];
-  constexpr int kShifts = 64;
+  constexpr int kShifts = 256;
   double sum = 0;
   for (int shift = 0; shift < kShifts; ++shift) {
     lightFog(lamp, fog, (static_cast<float>(shift) + 0.5f) / kShifts, 5, at, value, rays);
@@ -97,6 +97,48 @@ TEST(FrameKernels, LampsLightFogAsFarAsTheIntegralSays) {
     EXPECT_EQ(rays.tMax[0], 0);
   }
   EXPECT_NEAR(sum, truth, 2e-3 * truth);
+}
+
+// Four places find the light of dense fog, whether the lamp is within it, before it or behind it. (Lamps that lie more
+// than ten mean free paths deep are hardly seen at all.)
+TEST(FrameKernels, FourPlacesAreEnoughInDenseFog) {
+  constexpr int kPlaces = 4;
+  for (const bool within : {false, true})
+    for (const float sigmaT : {0.3f, 1.f, 1.9f, 3.f, 10.f, within ? 0.5f : 100.f}) {
+      FogRays fog{};
+      for (int i = 0; i < RayPacket::kSize; ++i) {
+        fog.dz[i] = 1, fog.t0[i] = 3, fog.t1[i] = 5;
+        for (auto& channel : fog.sigmaT) channel[i] = sigmaT;
+      }
+      LampPoint lamp;
+      lamp.known = true, lamp.all = 1, lamp.medium = within ? 0 : -1;
+      for (const float z : within ? std::vector<float>{4} : std::vector<float>{0, 8}) {
+        lamp.pz = z;
+        for (int i = 0; i < RayPacket::kSize; ++i) fog.ox[i] = 0.02f + 0.05f * static_cast<float>(i);
+        double found[RayPacket::kSize] = {};
+        const auto leftBy = [&](double d) { return within ? std::exp(-double{sigmaT} * d) : 1; };
+        for (int n = 0; n < kPlaces; ++n) {
+          KernelPlaces at;
+          RayPacket rays;
+          float value[3][RayPacket::kSize];
+          lightFog(lamp, fog, (static_cast<float>(n) + 0.5f) / kPlaces, 5, at, value, rays);
+          for (int i = 0; i < RayPacket::kSize; ++i) {
+            const auto x = double{at.px[i]}, y = double{at.pz[i]} - double{z};
+            found[i] += double{value[1][i]} * leftBy(std::sqrt(x * x + y * y)) / kPlaces;
+          }
+        }
+        for (int i = 0; i < RayPacket::kSize; ++i) {
+          double truth = 0;
+          constexpr int kSteps = 20000;
+          for (int k = 0; k < kSteps; ++k) {
+            const double t = 2 * (k + 0.5) / kSteps, x = double{fog.ox[i]}, y = 3 + t - double{z}, d2 = x * x + y * y;
+            truth += double{sigmaT} * std::exp(-double{sigmaT} * t) * leftBy(std::sqrt(d2)) / (4 * 3.14159265 * d2) *
+                     2 / kSteps;
+          }
+          EXPECT_NEAR(found[i] / truth, 1, 0.07) << within << ' ' << sigmaT << ' ' << z << ' ' << i;
+        }
+      }
+    }
 }
 
 TEST(FrameKernels, DensitiesAlongARayAreTheGrids) {

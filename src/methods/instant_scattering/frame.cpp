@@ -71,6 +71,8 @@ class FramePass {
         features[numberOf(x, y)] = block.features[i];
         if (!block.eyes[i].plain || !marches)
           block.radiance[i] = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+        else
+          block.radiance[i] += paths_.sampleCaustics(x, y, idOf(x, y));
         if (scene_.view.emissive) block.radiance[i] += paths_.sampleGlow(x, y, idOf(x, y));
         frame.set(x, y, block.radiance[i]);
       }

@@ -13,8 +13,10 @@
 namespace virga {
 
 /// `ims.mode=frame` (section 5 of the paper): few walks, all of whose virtual lights light every coarse pixel. A pass
-/// is a function of (scene, camera, settings, number of the pass): nothing is drawn by chance in a pixel, and the walks
-/// stay the same when the camera moves. Passes are averaged: each has other walks and other fixed points.
+/// is a function of (scene, camera, settings, number of the pass), and the walks stay the same when the camera moves.
+/// In a pixel all is looked at from fixed points, but for what is left to paths (mirrors, glass and what they throw on
+/// other things, narrow bsdfs, panes, media that glow): their numbers are fixed for each pixel. Passes are averaged:
+/// each has other walks and other fixed points.
 class FrameRenderer {
  public:
   /// What an edit has changed is forgotten. `walksStay`: as WalkStore::edit says.

@@ -98,6 +98,13 @@ void lightMedia(const LampPoint& lamp, const KernelPlaces& places, float scale, 
 void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scale, KernelPlaces& at,
               float (*value)[RayPacket::kSize], RayPacket& rays) {
   kernels::lampInFog(lamp, fog, place, at, value);
+  bool dense = false;
+  for (int i = 0; i < RayPacket::kSize; ++i) dense |= kernels::isDense(lamp, fog, i);
+  if (dense) {
+    kernels::FogProfile profile;
+    kernels::profileFog(lamp, fog, profile);
+    kernels::lampInDenseFog(lamp, fog, profile, place, at, value);
+  }
   alignas(64) float most[RayPacket::kSize];
   for (int i = 0; i < RayPacket::kSize; ++i) most[i] = std::fmax(value[0][i], std::fmax(value[1][i], value[2][i]));
   aimFromMedia(lamp, at, most, scale, rays);

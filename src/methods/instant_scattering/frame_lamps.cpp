@@ -2,7 +2,9 @@
 #include "methods/instant_scattering/frame_lamps.h"
 
 #include <bit>
+#include <optional>
 
+#include "core/distribution.h"
 #include "core/warp.h"
 #include "methods/instant_scattering/lamp_places.h"
 #include "methods/instant_scattering/light_visibility.h"
@@ -10,8 +12,8 @@
 namespace virga {
 namespace {
 
-/// Points of an area on surfaces: penumbrae are steps already.
-constexpr int kMostOfLamp = 4;
+/// Points of an area: penumbrae are steps already. Of the sky, and of a textured lamp where packets do not know it.
+constexpr int kMostOfLamp = 4, kMostOfSky = 16;
 
 /// Of a lamp's tables: of the smoke's own shadows a voxel or two, as it is seen from a lamp outside. Those of many
 /// points are an eighth as large: together they take 150 MB at most, where media are coloured.
@@ -32,6 +34,7 @@ LampPoint lampPoint(const SceneView& scene, const ChosenLamp& lamp) {
   point.all = on.pointLike ? 1.f : 0.f;
   point.r = sent.r, point.g = sent.g, point.b = sent.b;
   point.area = on.pointLike ? 0.f : 1 / on.areaPdf;
+  point.medium = emitter.medium;
   return point;
 }
 
@@ -40,7 +43,7 @@ LampPoint lampPoint(const SceneView& scene, const ChosenLamp& lamp) {
 Vec2 placeOnSphere(const FixedNumbers& numbers, int group, int k, int count) {
   const auto g = static_cast<float>(group);
   const Frame turned(uniformSphere(
-      {numbers.turned(0.5f + g * 0.7548777f, 0.7320508f), numbers.turned(0.5f + g * 0.5698403f, 0.2360680f)}));
+      {numbers.turned(0.5f + g * 0.7548777f, 0.7320508f), numbers.turned(0.5f + g * 0.5698403f, 0.3166248f)}));
   Vec3 at(0, 0, k % 2 == 0 ? 1.f : -1.f);
   if (count > 2 && k > 0)
     at = sphericalDirection(std::sqrt(8.f) / 3, -1 / 3.f, kTwoPi * (numbers.shift() + static_cast<float>(k) / 3));
@@ -49,12 +52,66 @@ Vec2 placeOnSphere(const FixedNumbers& numbers, int group, int k, int count) {
   return {clamp((1 - p.z) / 2, 0, 1), azimuth < 0 ? azimuth + 1 : azimuth};
 }
 
-/// Point k of a group on a lamp.
-ChosenLamp chosenLamp(const SceneView& scene, const FixedNumbers& numbers, int group, int k) {
-  const int count = numbers.onSurface(group);
-  ChosenLamp lamp = numbers.lamp(scene, group, k, count);
-  if (numbers.lamps[group].round && numbers.lamps[group].chosen < 0) lamp.u = placeOnSphere(numbers, group, k, count);
-  return lamp;
+/// Where on a lamp its texture is bright: a grid over the square of sampleLightPoint().
+class TexturedPlaces {
+ public:
+  TexturedPlaces(const SceneView& scene, const EmitterView& lamp) {
+    std::vector<float> weights(kSide * kSide), rows;
+    double sum = 0;
+    for (size_t n = 0; n < weights.size(); ++n) sum += double{weights[n] = radianceIn(scene, lamp, n)};
+    // No place is left out: what a cell's samples do not see counts little, and passes see it.
+    for (float& weight : weights) weight += kEven * static_cast<float>(sum) / static_cast<float>(weights.size());
+    for (size_t row = 0; row < kSide; ++row)
+      rows.push_back(static_cast<float>(columns_.emplace_back(std::span(&weights[row * kSide], kSide)).total()));
+    rows_ = Discrete(rows);
+  }
+
+  /// Moves a place of an even set to where it is bright. Returns the density there over the square.
+  float move(Vec2& place) const {
+    if (!(rows_.total() > 0)) return 1;
+    const auto row = rows_.view().sample(place.y);
+    const auto column = columns_[static_cast<size_t>(row.index)].view().sample(place.x);
+    place = {(static_cast<float>(column.index) + column.remapped) / kSide,
+             (static_cast<float>(row.index) + row.remapped) / kSide};
+    return row.probability * column.probability * kSide * kSide;
+  }
+
+ private:
+  static constexpr size_t kSide = 64, kLooks = 3;  ///< in either direction; the latter in each cell
+  static constexpr float kEven = 0.02f;
+
+  /// Mean of a cell.
+  static float radianceIn(const SceneView& scene, const EmitterView& lamp, size_t cell) {
+    constexpr auto kAll = static_cast<float>(kSide * kLooks);
+    float sum = 0;
+    for (size_t n = 0; n < kLooks * kLooks; ++n) {
+      const Vec2 at(static_cast<float>(cell % kSide * kLooks + n % kLooks) + 0.5f,
+                    static_cast<float>(cell / kSide * kLooks + n / kLooks) + 0.5f);
+      sum += mean(lamp.radianceAt(sampleLightPoint(scene, lamp, {at.x / kAll, at.y / kAll}).uv));
+    }
+    return sum / static_cast<float>(kLooks * kLooks);
+  }
+
+  std::vector<Discrete> columns_;  ///< of each row
+  Discrete rows_;
+};
+
+/// All points of a group, on one lamp or more.
+std::vector<LampPoint> pointsOf(const SceneView& scene, const FixedNumbers& numbers, int group) {
+  const LampGroup& own = numbers.lamps[group];
+  std::optional<TexturedPlaces> textured;
+  if (own.lamp != LampGroup::kDrawn && scene.emitters[own.lamp].texture.present())
+    textured.emplace(scene, scene.emitters[own.lamp]);
+  std::vector<LampPoint> points;
+  for (int k = 0; k < own.points; ++k) {
+    ChosenLamp lamp = numbers.lamp(scene, group, k, own.points);
+    if (textured)
+      lamp.chance *= textured->move(lamp.u);
+    else if (own.round && own.chosen < 0)
+      lamp.u = placeOnSphere(numbers, group, k, own.points);
+    points.push_back(lampPoint(scene, lamp));
+  }
+  return points;
 }
 
 }  // namespace
@@ -64,14 +121,17 @@ void FrameLamps::chooseGroups(const SceneView& scene) {
     if (scene.emitterChoice.probability(i) > 0) groups_.push_back({.lamp = i});
   if (groups_.empty()) return;
   if (groups_.size() > kMostPoints) {
-    groups_.assign(kMostPoints / FixedNumbers::kMostPlaces, LampGroup{.points = FixedNumbers::kMostPlaces});
+    constexpr int kEach = FixedNumbers::kMostPlaces;
+    groups_.assign(kMostPoints / kEach, LampGroup{.points = kEach, .onSurface = kEach});
     return;
   }
   const auto each = static_cast<int>(std::bit_floor(kMostPoints / groups_.size()));
   places_ = std::min(each, FixedNumbers::kMostPlaces);
   for (LampGroup& group : groups_) {
     const EmitterView& emitter = scene.emitters[group.lamp];
-    if (!emitter.isDelta()) group.points = std::min(each, kMostOfLamp);
+    if (!emitter.isDelta()) group.points = group.onSurface = std::min(each, kMostOfLamp);
+    if (isSky(emitter) || emitter.texture.present()) group.onSurface = std::min(each, kMostOfSky);
+    if (!isAimedAt(emitter)) group.points = 0;
     group.round =
         emitter.kind == EmitterView::Kind::area && scene.surfaces[emitter.shape].kind == ShapeView::Kind::sphere;
   }
@@ -99,8 +159,8 @@ FrameLamps::FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token&
   const FixedNumbers own = numbers(pass);
   std::vector<Vec3> places;
   for (int group = 0; group < own.groups(); ++group)
-    for (int k = 0; k < own.onSurface(group); ++k) {
-      const LampPoint& point = points_.emplace_back(lampPoint(view, chosenLamp(view, own, group, k)));
+    for (const LampPoint& point : pointsOf(view, own, group)) {
+      points_.push_back(point);
       places.push_back(Vec3(point.px, point.py, point.pz) + Vec3(point.nx, point.ny, point.nz) * mapOffset(view));
     }
   if (std::none_of(points_.begin(), points_.end(), [](const LampPoint& point) { return point.known; })) places.clear();

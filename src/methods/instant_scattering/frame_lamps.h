@@ -38,6 +38,7 @@ class FrameLamps {
   void visitTurns(int n, int places, Visit&& visit) const {
     int first = 0;
     for (const LampGroup& group : groups_) {
+      if (group.points == 0) continue;
       const int from = group.round ? 0 : n % group.points, to = group.round ? group.points : from + 1;
       const float share = static_cast<float>(group.points) / static_cast<float>(places * (to - from));
       for (int k = first + from; k < first + to; ++k)

@@ -10,8 +10,8 @@
 
 namespace virga {
 
-/// Pixels of a frame: functions of the scene, the camera and the virtual lights, nothing of which is drawn by chance.
-/// All of these must outlive it. Safe to call from many threads.
+/// Pixels of a frame: functions of the scene, the camera and the virtual lights, of fixed points. What is left to paths
+/// is not theirs. All of these must outlive it. Safe to call from many threads.
 class FramePixels {
  public:
   /// `pass` turns the fixed numbers: passes that are averaged look at different points.

@@ -18,6 +18,14 @@ VIRGA_HD inline bool marchesLamps(const SceneView& scene) {
   return !local || grids;
 }
 
+/// Is there light that lamps send by way of mirrors or glass alone, and that paths can find?
+VIRGA_HD inline bool hasCaustics(const SceneView& scene) {
+  bool met = false, specular = false;
+  for (const EmitterView& e : scene.emitters) met |= !e.isDelta();
+  for (const SurfaceBsdf& b : scene.bsdfs) specular |= b.front.specular() || (b.twoSided && b.back.specular());
+  return met && specular;
+}
+
 /// Eye paths that gather the light of virtual lights at each vertex that can be connected to. What it is made from must
 /// outlive it.
 template <class Rays>
@@ -39,13 +47,17 @@ class ImsEyePaths {
         gatherer_(scene, rays, lights, visibility, options.gather),
         compensation_(scene, rays, tracer_, gatherer_, options.compensation),
         marched_(scene, rays, lampTables),
-        marches_(marchesLamps(scene) && tracer_.mayScatter(0)) {}
+        marches_(marchesLamps(scene) && tracer_.mayScatter(0)),
+        caustics_(hasCaustics(scene)) {}
   ImsEyePaths(const ImsEyePaths&) = delete;
   ImsEyePaths& operator=(const ImsEyePaths&) = delete;
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler, Part part = Part::all) const {
-    if (LayerRadiance marched; part == Part::direct && marches_ && march(camera, marched, sampler)) return marched;
+    if (LayerRadiance marched; part == Part::direct && marches_ && march(camera, marched, sampler)) {
+      marched += traceCaustics(camera, sampler);
+      return marched;
+    }
     Path path = tracer_.start(camera);
     Record record;
     path.record = &record;
@@ -70,6 +82,19 @@ class ImsEyePaths {
   /// Likewise the light of media that glow, which virtual lights do not carry.
   VIRGA_HD LayerRadiance traceGlow(const CameraRay& camera, Sampler& sampler) const {
     return glowTracer_.trace(camera, sampler);
+  }
+  /// Likewise light that x1 gets from lamps by way of mirrors and glass alone: where lamps are marched to, that is not
+  /// looked for.
+  VIRGA_HD LayerRadiance traceCaustics(const CameraRay& camera, Sampler& sampler) const {
+    LayerRadiance caustics;
+    if (!caustics_) return caustics;
+    Path path = tracer_.start(camera);
+    path.lightsX1 = false;
+    while (tracer_.extend(path, sampler) && !path.layers.hasX2()) {
+    }
+    for (const Layer layer : {Layer::causticSurface, Layer::causticMedia})
+      caustics.add(layer, path.radiance.value[static_cast<int>(layer)]);
+    return caustics;
   }
   /// Is the light of x1 alone found by marching?
   VIRGA_HD bool marches() const { return marches_; }
@@ -116,7 +141,7 @@ class ImsEyePaths {
   Gatherer<Rays> gatherer_;          ///< likewise
   Compensation<Rays> compensation_;  ///< likewise
   MarchedLight<Rays> marched_;       ///< likewise
-  bool marches_;
+  bool marches_, caustics_;
 };
 
 }  // namespace virga

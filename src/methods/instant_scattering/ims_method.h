@@ -7,8 +7,8 @@ namespace virga {
 
 inline constexpr SettingInfo kImsSettings[] = {
     {"mode", "exact",
-     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: nothing "
-     "is drawn by chance, few lights light everything, pictures are coherent over time (biased)"},
+     "exact: unbiased; fast: what x2 scatters is computed at some pixels alone, and upsampled (biased); frame: few "
+     "lights and fixed points of lamps light everything, pictures are coherent over time (biased)"},
     {"samples", "16; frame: 4",
      "fast: samples of each of these pixels in a pass; frame: points of its eye ray that are lit, or paths where it "
      "sees a mirror or glass"},

@@ -39,7 +39,15 @@ class ImsPixels {
     features = pixelFeatures(eye);
     if (!eye.plain) return sample(x, y, id, Part::direct);
     Sampler sampler(id);
-    return paths_.light(eye, sampler);
+    LayerRadiance radiance = paths_.light(eye, sampler);
+    radiance += sampleCaustics(x, y, id);
+    return radiance;
+  }
+  /// Light that x1 gets from lamps by way of mirrors and glass alone, as ImsEyePaths::traceCaustics().
+  LayerRadiance sampleCaustics(int x, int y, const SampleId& id) const {
+    Sampler sampler(id);
+    const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
+    return paths_.traceCaustics(camera, sampler);
   }
   /// The light of media that glow, which virtual lights do not carry, in all layers: by paths of its own.
   LayerRadiance sampleGlow(int x, int y, SampleId id) const {

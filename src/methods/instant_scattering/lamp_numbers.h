@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/sampler.h"
+#include "core/warp.h"
 #include "scene/scene_view.h"
 
 namespace virga {
@@ -13,7 +14,18 @@ struct ChosenLamp {
   int index = 0;     ///< of the emitter
   float chance = 0;  ///< how many of the points of this kind are expected to be this lamp's; 0: there is no lamp
   Vec2 u;            ///< place on it
+  enum class Sky { no, bright, even } sky = Sky::no;  ///< one of two sets of directions of an environment
 };
+
+/// Light of a chosen lamp as seen from x. Of an environment half of the points are where it is bright, which may be a
+/// sun alone, and half are all around, each half weighted by the balance heuristic.
+VIRGA_HD inline LightSample sampleLamp(const SceneView& scene, const ChosenLamp& lamp, Vec3 x) {
+  const EmitterView& emitter = scene.emitters[lamp.index];
+  if (lamp.sky == ChosenLamp::Sky::no) return sampleLight(scene, emitter, x, lamp.u);
+  const Vec3 w = lamp.sky == ChosenLamp::Sky::even ? uniformSphere(lamp.u) : emitter.environment.sample(lamp.u).w;
+  const float pdf = 0.5f * (environmentPdf(emitter, w) + kInv4Pi);
+  return {w, kInfinity, environmentRadiance(emitter, w), pdf, false};
+}
 
 /// By power, as one of `count` points.
 VIRGA_HD inline ChosenLamp chooseLamp(const SceneView& scene, float choice, Vec2 u, int count) {
@@ -26,6 +38,9 @@ VIRGA_HD inline ChosenLamp chooseLamp(const SceneView& scene, float choice, Vec2
 VIRGA_HD inline bool isAimedAt(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::area;
 }
+
+/// Lights from all around.
+VIRGA_HD inline bool isSky(const EmitterView& e) { return e.infinite() && !e.isDelta(); }
 
 /// Drawn anew in each sample (`fast`): one group, of any lamps.
 struct RandomNumbers {
@@ -50,7 +65,8 @@ struct LampGroup {
   static constexpr int kDrawn = -1;
 
   int lamp = kDrawn;   ///< index of the emitter
-  int points = 1;      ///< on surfaces; a power of two, places() at most
+  int points = 1;      ///< for packets; a power of two, places() at most, or 0 if packets do not know the lamp
+  int onSurface = 1;   ///< for a surface that packets do not know
   bool round = false;  ///< most places see a part of the points alone: all of them light each place in media
   int chosen = -1;     ///< where its points are among those that were chosen; -1: they are an even set
 };
@@ -70,19 +86,21 @@ struct FixedNumbers {
   VIRGA_HD Vec2 place() const { return {turned(0.5f, 0.7548777f), turned(0.5f, 0.5698403f)}; }
 
   VIRGA_HD int groups() const { return lamps.size; }
-  VIRGA_HD int onSurface(int group) const { return lamps[group].points; }
+  VIRGA_HD int onSurface(int group) const { return lamps[group].onSurface; }
   VIRGA_HD int places() const { return placesOfEach; }
   VIRGA_HD ChosenLamp lamp(const SceneView& scene, int group, int k, int count) const {
-    const LampGroup& own = lamps[group];
-    if (own.lamp != LampGroup::kDrawn)
+    if (const LampGroup& own = lamps[group]; own.lamp != LampGroup::kDrawn) {
+      if (isSky(scene.emitters[own.lamp])) return inSky(scene, own.lamp, k, count);
       return {own.lamp, static_cast<float>(count),
               own.chosen < 0 ? placeOnLamp(k, count) : chosen[own.chosen + k % own.points]};
+    }
     // Of all groups' points together, each group has every so many.
     const int all = count * groups(), number = k * groups() + group;
     return chooseLamp(scene, choiceOf(number, all), placeOnLamp(number, all), all);
   }
 
-  /// A number of pass 0 in that of this pass, which moves `by` so much from one to the next.
+  /// A number of pass 0 in that of this pass, which moves `by` so much from one to the next. Steps of numbers that are
+  /// used together must have no relation in whole numbers: passes would not see all that they can be together.
   VIRGA_HD float turned(float x, float by) const {
     const float y = x + by * static_cast<float>(pass % 4096u);
     return std::fmin(y - std::floor(y), 0x1.fffffep-1f);
@@ -100,7 +118,22 @@ struct FixedNumbers {
     Vec2 place(0.5f + n * 0.7548777f, 0.5f + n * 0.5698403f);
     if (count == 2) place = Vec2(0.25f + 0.5f * n, 0.25f + 0.5f * n);
     if (count == 4) place = {kFour[k % 4].x, kFour[k % 4].y};
-    return {turned(place.x, 0.7320508f), turned(place.y, 0.2360680f)};
+    return {turned(place.x, 0.7320508f), turned(place.y, 0.3166248f)};
+  }
+  VIRGA_HD ChosenLamp inSky(const SceneView& scene, int lamp, int k, int count) const {
+    const auto share = static_cast<float>(count);
+    if (scene.emitters[lamp].kind == EmitterView::Kind::constant || count % 2 != 0)
+      return {lamp, share, placeInSky(k, count)};
+    // Passes swap the halves: places along an eye ray must see both.
+    const bool even = (static_cast<uint32_t>(k) + pass) % 2 == 0;
+    return {lamp, share, placeInSky(k / 2, count / 2), even ? ChosenLamp::Sky::even : ChosenLamp::Sky::bright};
+  }
+  /// The lattice of the golden ratio: on the sphere equal slices, one direction in each, so that surfaces of all
+  /// orientations get about as much light. Neighbours are far apart in k: places along an eye ray are not in step with
+  /// directions.
+  VIRGA_HD Vec2 placeInSky(int k, int count) const {
+    const auto n = static_cast<float>(5 * k % count);
+    return {turned((n + 0.5f) / static_cast<float>(count), 0.7320508f), turned(n * 0.6180340f, 0.3166248f)};
   }
   static constexpr struct {
     float x, y;

@@ -30,6 +30,7 @@ void set(FogRays& fog, int i, const MarchedEye& eye, const MediumView& medium) {
   for (int c = 0; c < 3; ++c) fog.sigmaT[c][i] = medium.spectrum[c] * medium.sigmaT;
   const auto* hg = medium.phase.get<HenyeyGreenstein>();
   fog.anisotropy[i] = hg ? hg->g : 0;
+  fog.medium[i] = eye.media[0].medium(0);
 }
 
 KernelReceivers receivers(const KernelPlaces& at) {

@@ -45,7 +45,7 @@ class MarchedLight {
         if (!(lamp.chance > 0)) return;
         const EmitterView& emitter = scene_.emitters[lamp.index];
         if (lamps == MediaLamps::atInfinity && isAimedAt(emitter)) return;
-        const LightSample light = sampleLight(scene_, emitter, p, lamp.u);
+        const LightSample light = sampleLamp(scene_, lamp, p);
         const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, lamp.index, light, numbers);
         radiance.add(Layer::directMedia, found * (1 / lamp.chance));
       });
@@ -92,7 +92,7 @@ class MarchedLight {
       for (int k = 0; k < numbers.onSurface(group); ++k) {
         const ChosenLamp lamp = numbers.lamp(scene_, group, k, numbers.onSurface(group));
         if (!(lamp.chance > 0)) return;
-        const LightSample light = sampleLight(scene_, scene_.emitters[lamp.index], point.p, lamp.u);
+        const LightSample light = sampleLamp(scene_, lamp, point.p);
         if (!(light.pdf > 0)) continue;
         const Rgb value = SurfaceScattering(eye.side).scattering(wo, light.wi) * light.radiance;
         if (isBlack(value)) continue;
