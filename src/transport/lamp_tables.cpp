@@ -12,21 +12,6 @@ namespace {
 /// A wider square of directions would waste its corners: all around is better.
 constexpr float kMostReach = 1.5f;
 
-/// What the cells of a grid fill that are not empty, in the world.
-void extendByGrid(const MediumView& medium, Bounds& bounds) {
-  const CoarseGridView& cells = medium.density.majorant;
-  Bounds filled;
-  for (int k = 0; k < cells.nz; ++k)
-    for (int j = 0; j < cells.ny; ++j)
-      for (int i = 0; i < cells.nx; ++i) {
-        if (!(cells.cell(i, j, k) > 0)) continue;
-        const Vec3 lo =
-            cells.origin + Vec3(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) * cells.cellSize;
-        filled.extend(lo), filled.extend(lo + cells.cellSize);
-      }
-  if (!filled.empty()) bounds.extend(boundsInWorld(medium, filled));
-}
-
 bool isPointLike(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::spot;
 }
@@ -87,18 +72,10 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
 
 }  // namespace
 
-Bounds filledBounds(const Scene& scene) {
-  Bounds bounds;
-  for (const MediumView& medium : scene.view.media) extendByGrid(medium, bounds);
-  if (!mediaAreBounded(scene)) return bounds;
-  const Bounds within = scene.boundaryRays->bounds();
-  return {max(bounds.lo, within.lo), min(bounds.hi, within.hi)};
-}
-
 LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop) {
   const SceneView& view = scene.view;
   if (lampTableSide(view) == 0) return;
-  const Bounds bounds = filledBounds(scene);
+  const Bounds bounds = boundsOfMedia(scene);
   if (bounds.empty()) return;
   const int endless = endlessMedium(scene), channels = channelsOf(view);
   for (const EmitterView& emitter : view.emitters) {

@@ -95,8 +95,6 @@ class LampTables {
   std::vector<std::vector<float>> depths_;
 };
 
-/// A box around the cells of all grids that are not empty, as far as media reach.
-Bounds filledBounds(const Scene& scene);
 /// Nodes in either direction that do justice to the scene's grids: one and a half for each voxel of the largest, but at
 /// least 32 and at most 256. 0 where there can be no tables.
 int lampTableSide(const SceneView& scene);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "scene/scene.h"
 
 namespace virga {
@@ -9,10 +11,10 @@ namespace virga {
 bool endsByItself(const MediumView&);
 /// The world's box around a box in the index coordinates of a medium's grid.
 Bounds boundsInWorld(const MediumView&, const Bounds& inGrid);
-/// Are all media within closed boundaries, wherever the camera is?
-bool mediaAreBounded(const Scene& scene);
-/// All of the scene that holds media, as far as rays from a few points tell: where grids hold nothing there are none.
-/// Empty if there are no media.
+/// Boxes that hold all of a medium: those of the shapes that it fills, cut with that of its grid's filled cells if it
+/// is nothing elsewhere. Where neither ends, as far as may matter. None if the medium is nowhere.
+std::vector<Bounds> placesOf(const Scene& scene, int medium);
+/// A box that holds all media, likewise: nothing is missed, though there may be less in it. Empty if there are none.
 Bounds boundsOfMedia(const Scene& scene);
 
 }  // namespace virga

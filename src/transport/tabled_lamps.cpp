@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "transport/media_bounds.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -96,7 +97,7 @@ TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& st
   if (view.chromatic || side == 0) return;
   tables_ = LampTables(scene, side, stop);
   if (tables_.view().size == 0 || stop.stop_requested()) return;
-  const Bounds media = filledBounds(scene);
+  const Bounds media = boundsOfMedia(scene);
   const std::vector<Vec3> points = pointsInMedia(view);
   const int endless = endlessMedium(scene);
   const float voxels = mostVoxels(view);
