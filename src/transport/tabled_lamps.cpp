@@ -113,19 +113,20 @@ TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& st
   if (std::none_of(lamps_.begin(), lamps_.end(), [](const TabledLamp& lamp) { return lamp.present(); })) lamps_.clear();
 }
 
-int tabledLampSide(const SceneView& scene, int64_t pixels) {
-  if (scene.chromatic || scene.thinGlass) return 0;
+int tabledLampSide(const Scene& scene, int64_t pixels) {
+  if (scene.view.chromatic || scene.view.thinGlass) return 0;
   size_t voxels = 0;
-  for (const MediumView& medium : scene.media) {
+  for (const MediumView& medium : scene.view.media) {
     const Vec3 size = medium.density.supportHi - medium.density.supportLo;
     voxels += static_cast<size_t>(double{size.x} * double{size.y} * double{size.z});
   }
   // So many nodes take as long as a path or two.
   constexpr size_t kLeastBytes = 16 << 20, kNodesPerPixel = 64;
+  constexpr int kMostNodes = 256;
   const size_t most = std::min(std::max(kLeastBytes, voxels * sizeof(float) * 2 / 5),
                                static_cast<size_t>(pixels) * kNodesPerPixel * sizeof(float));
-  int side = lampTableSide(scene);
-  while (side > LampTables::kLeastSide && lampTableBytes(scene, side) > most) side -= side / 8 + 1;
+  int side = static_cast<int>(std::min(wantedLampTableSide(scene), float{kMostNodes}));
+  while (side > LampTables::kLeastSide && lampTableBytes(scene.view, side) > most) side -= side / 8 + 1;
   return std::max(0, side);
 }
 

@@ -61,7 +61,7 @@ Errors errorsOf(const Scene& scene, int side) {
 
 void expectTables(const std::string& elements, double limit = 0.015) {
   const SceneSnapshot scene = sceneOf(elements);
-  const int side = lampTableSide(scene->view);
+  const int side = lampTableSide(*scene);
   ASSERT_GT(side, 0);
   const Errors fine = errorsOf(*scene, side), coarse = errorsOf(*scene, side / 8);
   ASSERT_LT(fine.darkest, 0.5) << "there is something to be in the shadow of";
@@ -107,7 +107,7 @@ TEST(LampTables, WhereTheyCannotBeThereAreNone) {
   for (int i = 0; i < LampTables::kMostLamps; ++i) many += point;
   for (const std::string& elements : {fog(8) + point, replaced(plume(8), lamp, sun + sphere), many}) {
     const SceneSnapshot scene = sceneOf(elements);
-    EXPECT_EQ(lampTableSide(scene->view), 0);
+    EXPECT_EQ(lampTableSide(*scene), 0);
     EXPECT_EQ(LampTables(*scene, 16, {}).view().size, 0);
   }
   const SceneSnapshot mixed = sceneOf(plume(8) + sphere + sun);
