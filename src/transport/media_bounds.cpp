@@ -77,6 +77,19 @@ std::vector<Bounds> declaredPlaces(const Scene& scene, int medium) {
   return everywhere ? std::vector<Bounds>{kEverywhere} : places;
 }
 
+Bounds joined(Bounds a, const Bounds& b) {
+  a.extend(b);
+  return a;
+}
+
+/// How little two boxes belong together: 0 where they have a point in common, or else what they span together, over
+/// what the smaller one does.
+float apart(const Bounds& a, const Bounds& b) {
+  if (overlap(a, b)) return 0;
+  const float least = std::min(length(a.extent()), length(b.extent()));
+  return length(joined(a, b).extent()) / std::max(least, 1e-12f);
+}
+
 }  // namespace
 
 bool endsByItself(const MediumView& medium) {
@@ -106,6 +119,25 @@ Bounds boundsOfMedia(const Scene& scene) {
   for (int m = 0; m < scene.view.media.size; ++m)
     for (const Bounds& place : placesOf(scene, m)) bounds.extend(place);
   return bounds;
+}
+
+std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most) {
+  constexpr float kApart = 2;
+  constexpr size_t kTooMany = 64;
+  std::vector<Bounds> boxes;
+  for (int m = 0; m < scene.view.media.size; ++m)
+    for (const Bounds& place : placesOf(scene, m)) boxes.push_back(place);
+  if (boxes.size() > kTooMany) return {boundsOfMedia(scene)};
+  for (;;) {
+    float least = kInfinity;
+    size_t first = 0, second = 0;
+    for (size_t i = 0; i < boxes.size(); ++i)
+      for (size_t j = i + 1; j < boxes.size(); ++j)
+        if (const float a = apart(boxes[i], boxes[j]); a < least) least = a, first = i, second = j;
+    if (boxes.size() < 2 || (least > kApart && boxes.size() <= most)) return boxes;
+    boxes[first].extend(boxes[second]);
+    boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(second));
+  }
 }
 
 }  // namespace virga

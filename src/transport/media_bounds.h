@@ -16,5 +16,8 @@ Bounds boundsInWorld(const MediumView&, const Bounds& inGrid);
 std::vector<Bounds> placesOf(const Scene& scene, int medium);
 /// A box that holds all media, likewise: nothing is missed, though there may be less in it. Empty if there are none.
 Bounds boundsOfMedia(const Scene& scene);
+/// Boxes without common points that hold all media, `most` at most (> 0): media that are wider than the gap between
+/// them share one.
+std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most);
 
 }  // namespace virga
