@@ -102,6 +102,21 @@ TEST_F(MediaBoundsTest, FogInAShapeAndAroundEverything) {
   }
 }
 
+TEST_F(MediaBoundsTest, BoxesAreSharedByWhatLiesTogether) {
+  const auto boxes = [&](double x, double size, size_t most) {
+    const std::string fog = R"(<medium type="homogeneous" id="f"/>)", center = fmt::format(R"(x="{}" y="0" z="0")", x);
+    return boxesOfMedia(
+        *build(fog + cube(R"(x="0" y="0" z="0")", 2, interior("f")) + cube(center, size, interior("f")) + kFloor),
+        most);
+  };
+  EXPECT_EQ(boxes(2.1, 2, 8).size(), 1u);
+  ASSERT_EQ(boxes(9, 2, 8).size(), 2u);
+  EXPECT_FALSE(overlap(boxes(9, 2, 8)[0], boxes(9, 2, 8)[1]));
+  EXPECT_EQ(boxes(1.3, 0.1, 8).size(), 2u) << "small beside large";
+  EXPECT_EQ(boxes(9, 2, 1).size(), 1u);
+  expectNear(boxes(9, 2, 1)[0], {Vec3(-1), Vec3(10, 1, 1)});
+}
+
 TEST_F(MediaBoundsTest, NoMedia) { EXPECT_TRUE(boundsOfMedia(*build(kFloor)).empty()); }
 
 // Points that lie in a medium, by asking for the media at each.

@@ -108,9 +108,9 @@ MediaBetween::MediaBetween(const Scene& scene, std::vector<Vec3> points, const O
 }
 
 size_t MediaBetween::mostParts() const {
-  constexpr size_t kMostBytes = 256 << 20, kMost = 8;
+  constexpr size_t kMostBytes = 256 << 20;
   const size_t one = std::max<size_t>(1, points_.size()) * static_cast<size_t>(channels_) * sizeOfTable();
-  return std::clamp(kMostBytes / (one * sizeof(float)), size_t{1}, kMost);
+  return std::clamp(kMostBytes / (one * sizeof(float)), size_t{1}, static_cast<size_t>(options_.parts));
 }
 
 template <class Visit>

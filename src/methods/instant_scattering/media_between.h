@@ -18,6 +18,7 @@ class MediaBetween {
   struct Options {
     int side = 12;   ///< of a table: directions along an octahedral map's edge
     int radii = 24;  ///< and distances
+    int parts = 8;   ///< at most
   };
   /// How the media between two points are known.
   enum class Kind { nothing, fog, tables };
@@ -47,7 +48,7 @@ class MediaBetween {
     return static_cast<size_t>(options_.side) * static_cast<size_t>(options_.side) *
            static_cast<size_t>(options_.radii);
   }
-  /// So many parts that tables take 256 MB.
+  /// Fewer than the options say where tables would take more than 256 MB.
   size_t mostParts() const;
   /// Some nodes' directions of one part from point number i, which lies in these media.
   void fill(const Scene& scene, size_t i, size_t part, const MediaState& media, size_t first);
