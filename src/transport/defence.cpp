@@ -94,11 +94,9 @@ bool isWithin(const std::vector<Bounds>& places, Vec3 p) {
   });
 }
 
-bool hasCells(const MediumView& m) { return !m.homogeneous && m.density.kind != GridView::Kind::constant; }
-
 /// Does a point lie in a coarse cell that is not empty?
 bool isFilled(const MediumView& medium, Vec3 p) {
-  if (!hasCells(medium)) return false;
+  if (!isGrid(medium)) return false;
   const Vec3 q = medium.worldToDensity.point(p);
   return medium.density.supports(q) && medium.density.majorant.cellAt(q) > 0;
 }
@@ -115,26 +113,22 @@ template <class LeaveOut>
 void compareCells(const MediumView& in, const std::vector<Bounds>& places, const LeaveOut& leaveOut,
                   const MediumView& then, const MediumView& now, ExtinctionChange& change) {
   constexpr int kPoints = 8192;  // at least, in all
-  if (!hasCells(in)) return;
+  if (!isGrid(in)) return;
   const CoarseGridView& cells = in.density.majorant;
-  const size_t count = static_cast<size_t>(cells.nx) * static_cast<size_t>(cells.ny) * static_cast<size_t>(cells.nz);
-  const auto filled =
-      static_cast<int>(std::count_if(cells.values, cells.values + count, [](float v) { return v > 0; }));
-  const int each = filled > 0 ? (kPoints + filled - 1) / filled : 0;
+  int filled = 0;
+  visitFilledCells(cells, [&](Vec3, float) { ++filled; });
+  const int each = (kPoints + filled - 1) / std::max(1, filled);
   const Affine toWorld = in.worldToDensity.inverse();
   const Vec3 size = cells.cellSize;
-  const auto volume =
-      static_cast<double>(std::fabs(dot(toWorld.x * size.x, cross(toWorld.y * size.y, toWorld.z * size.z)))) /
-      std::max(1, each);
+  const float cell = std::fabs(dot(toWorld.x * size.x, cross(toWorld.y * size.y, toWorld.z * size.z)));
+  const double volume = static_cast<double>(cell) / each;
   uint32_t n = 0;
-  for (int k = 0; k < cells.nz; ++k)
-    for (int j = 0; j < cells.ny; ++j)
-      for (int i = 0; i < cells.nx; ++i)
-        for (int point = 0; cells.cell(i, j, k) > 0 && point < each; ++point) {
-          const Vec3 cell(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
-          const Vec3 p = toWorld.point(cells.origin + (cell + spreadPoint(n++)) * size);
-          if (isWithin(places, p) && !leaveOut(p)) change.add(then.sigmaTAt(p), now.sigmaTAt(p), volume);
-        }
+  visitFilledCells(cells, [&](Vec3 lo, float) {
+    for (int i = 0; i < each; ++i) {
+      const Vec3 p = toWorld.point(lo + spreadPoint(n++) * size);
+      if (isWithin(places, p) && !leaveOut(p)) change.add(then.sigmaTAt(p), now.sigmaTAt(p), volume);
+    }
+  });
 }
 
 ExtinctionChange compareInBox(const Bounds& box, const MediumView& then, const MediumView& now) {
@@ -160,7 +154,7 @@ Defence defenceOf(const Scene& scene, const std::vector<Rgb>& extinctions) {
   const std::vector<float> across = extents(scene);
   for (size_t m = 0; m < across.size(); ++m) {
     const MediumView& medium = scene.view.media[static_cast<int>(m)];
-    const bool grid = !medium.homogeneous && medium.density.kind != GridView::Kind::constant;
+    const bool grid = isGrid(medium);
     DefensiveRates r{1 / across[m], mean(extinctions[m]) * (grid ? kFloor : 1), 0, {}};
     defence.spread.push_back(grid ? spreadOut(medium.density.mean) : std::vector<float>());
     if (grid) {

@@ -16,16 +16,9 @@ bool contains(const Bounds& outer, const Bounds& inner) { return common(outer, i
 
 /// The cells of a grid that are not empty, as far as its values reach, in index coordinates.
 Bounds filledInGrid(const GridView& grid) {
-  const CoarseGridView& cells = grid.majorant;
   Bounds filled;
-  for (int k = 0; k < cells.nz; ++k)
-    for (int j = 0; j < cells.ny; ++j)
-      for (int i = 0; i < cells.nx; ++i) {
-        if (!(cells.cell(i, j, k) > 0)) continue;
-        const Vec3 lo =
-            cells.origin + Vec3(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) * cells.cellSize;
-        filled.extend(lo), filled.extend(lo + cells.cellSize);
-      }
+  visitFilledCells(grid.majorant,
+                   [&](Vec3 lo, float) { filled.extend(lo), filled.extend(lo + grid.majorant.cellSize); });
   return common(filled, {grid.supportLo, grid.supportHi});
 }
 
@@ -52,8 +45,7 @@ Bounds farBounds(const Scene& scene) {
     for (const EmitterView& e : view.emitters)
       if (e.isLocal()) near.extend(e.position);
   for (const MediumView& m : view.media)
-    if (!m.homogeneous && m.density.kind != GridView::Kind::constant)
-      near.extend(boundsInWorld(m, {m.density.supportLo, m.density.supportHi}));
+    if (isGrid(m)) near.extend(boundsInWorld(m, {m.density.supportLo, m.density.supportHi}));
   const float across = length(near.extent()), beyond = across > 0 ? 2 * across : 1e3f;
   return {near.lo - Vec3(beyond), near.hi + Vec3(beyond)};
 }
@@ -92,9 +84,9 @@ float apart(const Bounds& a, const Bounds& b) {
 
 }  // namespace
 
-bool endsByItself(const MediumView& medium) {
-  return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
-}
+bool isGrid(const MediumView& medium) { return !medium.homogeneous && medium.density.kind != GridView::Kind::constant; }
+
+bool endsByItself(const MediumView& medium) { return isGrid(medium) && !(medium.density.background > 0); }
 
 Bounds boundsInWorld(const MediumView& medium, const Bounds& inGrid) {
   const Affine toWorld = medium.worldToDensity.inverse();

@@ -28,16 +28,10 @@ struct FilledCell {
 
 std::vector<FilledCell> filledCells(const SceneView& scene) {
   std::vector<FilledCell> filled;
-  for (int m = 0; m < scene.media.size; ++m) {
-    const CoarseGridView& cells = scene.media[m].density.majorant;
-    for (int k = 0; k < cells.nz; ++k)
-      for (int j = 0; j < cells.ny; ++j)
-        for (int i = 0; i < cells.nx; ++i) {
-          const Vec3 cell(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
-          const float majorant = cells.cell(i, j, k);
-          if (majorant > 0) filled.push_back({m, cells.origin + cell * cells.cellSize, majorant});
-        }
-  }
+  for (int m = 0; m < scene.media.size; ++m)
+    visitFilledCells(scene.media[m].density.majorant, [&](Vec3 lo, float majorant) {
+      filled.push_back({m, lo, majorant});
+    });
   return filled;
 }
 
