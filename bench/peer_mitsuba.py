@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SCENE TARGET.npy VARIANT SPP REPLICATES FIRST_SEED [name=value ...]: pictures by Mitsuba 3 with the seeds from the first on. Prints the
-seconds of rendering."""
+CPU seconds of rendering."""
 
 import sys
 import time
@@ -15,10 +15,10 @@ def main():
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     loaded = mi.load_file(scene, **dict(pair.split("=", 1) for pair in sys.argv[7:]))
-    start = time.monotonic()
+    start = time.process_time()
     pictures = [np.array(mi.render(loaded, spp=spp, seed=seed))[..., :3] for seed in range(first, first + replicates)]
     np.save(target, np.array(pictures))
-    print(time.monotonic() - start)
+    print(time.process_time() - start)
 
 
 main()

@@ -18,6 +18,7 @@ namespace virga::app {
 struct SceneOptions {
   std::string file;
   std::map<std::string, std::string> defines;
+  std::string frame;  ///< of a sequence: the value of $frame; empty: a picture by itself
   bool lenient = false;
 };
 

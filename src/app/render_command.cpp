@@ -187,7 +187,7 @@ class RenderJob {
 
   SceneSnapshot loadAndBuild() {
     SceneOptions options = options_.scene;
-    if (report_.frame) options.defines["frame"] = frameText(*report_.frame);
+    if (report_.frame) options.frame = frameText(*report_.frame);
     const SceneDescription description =
         timed(report_.timings.load, [&] { return loadScene(options, report_.warnings); });
     requireInputsSafe(filesOf(description));

@@ -101,6 +101,7 @@ std::string statsJson(const RenderSession& session, const RenderReport& report) 
                      {"estimated_relmse", error ? Json(*error) : Json(nullptr)},
                      {"audit", report.audit ? auditJson(*report.audit, report.relMseLimit) : Json(nullptr)},
                      {"non_finite_samples", session.film().nonFiniteSamples()},
+                     {"resident_bytes", residentBytes()},
                      {"peak_resident_bytes", peakResidentBytes()},
                      {"warnings", report.warnings},
                      {"outputs", report.outputs}};

@@ -62,8 +62,9 @@ SceneDescription sceneAroundVolume(const std::vector<std::string>& frames, doubl
 
 SceneDescription loadScene(const SceneOptions& options, std::vector<std::string>& warnings) {
   if (!isVolumeFile(options.file))
-    return loadMitsubaXml(options.file,
-                          {.defines = options.defines, .lenient = options.lenient, .warnings = &warnings});
+    return loadMitsubaXml(
+        options.file,
+        {.defines = options.defines, .frame = options.frame, .lenient = options.lenient, .warnings = &warnings});
   if (!options.defines.empty())
     throw Error(fmt::format("-D has no meaning for \"{}\": a volume has no variables", options.file));
   return sceneAroundVolume({options.file}, BareVolume{}.thickness);

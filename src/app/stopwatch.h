@@ -2,9 +2,11 @@
 #pragma once
 
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cstdint>
+#include <fstream>
 
 namespace virga::app {
 
@@ -28,7 +30,14 @@ inline double cpuSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Most memory that the process ever held [bytes].
+/// Memory that the process holds now [bytes]; 0 where the system does not tell.
+inline int64_t residentBytes() {
+  int64_t all = 0, resident = 0;  // [pages]
+  std::ifstream("/proc/self/statm") >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
+
+/// Most memory that the process ever held [bytes]; the system counts in coarser steps than above.
 inline int64_t peakResidentBytes() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);

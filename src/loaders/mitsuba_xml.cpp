@@ -52,7 +52,7 @@ std::vector<std::string> knownTags() {
 class Loader {
  public:
   explicit Loader(const LoadOptions& options)
-      : variables_(options.defines), complaints_(options.lenient, options.warnings) {}
+      : variables_(options.defines, options.frame), complaints_(options.lenient, options.warnings) {}
 
   SceneDescription load(const std::shared_ptr<const SourceFile>& file, const fs::path& directory) {
     sceneDirectory_ = folderIn(fs::current_path(), directory);
@@ -69,6 +69,7 @@ class Loader {
     NodeDraft& scene = addNode(root, attributes);
     readChildren(scene, root, context, 1);
     NodePtr resolved = drafts_.resolve(scene);
+    variables_.requireFrameUsed(root.position);
     variables_.requireAllUsed();
     for (const Error& unused : variables_.unusedDefaults()) complaints_.warn(unused);
     return {std::move(resolved), searchPaths(), sources_};

@@ -12,6 +12,7 @@ namespace virga {
 
 struct LoadOptions {
   std::map<std::string, std::string> defines{};  ///< `-D name=value`: the value of $name, before any default
+  std::string frame{};                           ///< of a sequence: the value of $frame; empty: a picture by itself
   bool lenient = false;                          ///< unknown elements and attributes become warnings
   std::vector<std::string>* warnings = nullptr;  ///< where warnings go, each a full text to show; may be null
 };

@@ -35,8 +35,10 @@ std::string_view word(std::string_view text) {
 
 }  // namespace
 
-Variables::Variables(const std::map<std::string, std::string>& defines) {
-  for (const auto& [name, value] : defines) variables_[name] = {value, "given on the command line", {}, true};
+Variables::Variables(const std::map<std::string, std::string>& defines, const std::string& frame) {
+  for (const auto& [name, value] : defines)
+    variables_[name] = {.value = value, .origin = "given on the command line", .isDefine = true};
+  if (!frame.empty()) variables_["frame"] = {.value = frame, .origin = "the number of the frame", .isFrame = true};
 }
 
 void Variables::addDefault(const std::string& name, const std::string& value, const SourcePosition& position) {
@@ -118,6 +120,14 @@ void Variables::requireAllUsed() const {
                  .hint = isDefault ? "" : didYouMean(name, known),
                  .notes = {known.empty() ? "the scene has no variables" : "the scene's variables: " + joined(known)}});
   }
+}
+
+void Variables::requireFrameUsed(const SourcePosition& scene) const {
+  const auto found = variables_.find("frame");
+  if (found == variables_.end() || !found->second.isFrame || found->second.used) return;
+  throw errorAt(scene, "all frames would be the same picture: nothing in this scene uses $frame", "",
+                {"name files by it, as in value=\"smoke.$frame.vol\", or put an <animation> in place of a <transform>",
+                 "for a single picture leave out --frames"});
 }
 
 std::vector<Error> Variables::unusedDefaults() const {

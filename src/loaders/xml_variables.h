@@ -14,7 +14,8 @@ namespace virga {
 /// The `$variables` of a scene: given on the command line, or with `<default name="..." value="..."/>`.
 class Variables {
  public:
-  explicit Variables(const std::map<std::string, std::string>& defines);
+  /// `frame`: of a sequence, the value of $frame; empty: there is none.
+  Variables(const std::map<std::string, std::string>& defines, const std::string& frame);
 
   /// A default holds unless the variable has a value already: the command line wins, then the first default.
   void addDefault(const std::string& name, const std::string& value, const SourcePosition& position);
@@ -28,6 +29,8 @@ class Variables {
 
   /// Throws Error for a value from the command line that no attribute used: it would change nothing.
   void requireAllUsed() const;
+  /// Throws Error, placed at `scene`, where frames of a sequence would all be the same.
+  void requireFrameUsed(const SourcePosition& scene) const;
 
   /// The defaults that no attribute used: each as an error that may be shown as a warning.
   std::vector<Error> unusedDefaults() const;
@@ -37,7 +40,8 @@ class Variables {
     std::string value;
     std::string origin;         // for a note
     SourcePosition position{};  // of the default, where the value is that
-    bool isDefine = false;
+    bool isDefine = false;      // by -D
+    bool isFrame = false;       // of a sequence
     bool used = false;
   };
 

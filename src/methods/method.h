@@ -65,7 +65,8 @@ struct SettingInfo {
   std::string_view name, defaultValue, summary;
 };
 
-/// A rendering method. Averaged passes are pure functions of (snapshot, settings, seed, replicate, index).
+/// A rendering method. Averaged passes are pure functions of (snapshot, settings, seed, replicate, index), unless a
+/// setting says that something is kept from frame to frame of a sequence: then their expectation is.
 class Method {
  public:
   virtual ~Method() = default;
@@ -85,7 +86,8 @@ class Method {
   virtual SettingValues settingsInForce() const = 0;
 
   virtual Overlay overlay() const { return {}; }
-  /// Everything besides (snapshot, settings, film) that later passes depend on; empty for methods with pure passes.
+  /// Everything besides (snapshot, settings, film) that the expectation of later passes depends on; empty for methods
+  /// with pure passes, and where what is kept from frame to frame decides their noise alone.
   virtual std::string saveState() const { return {}; }
   virtual void loadState(std::string_view) {}
 };

@@ -162,7 +162,8 @@ double power(const EmitterView& e, float sceneRadius) {
   }
 }
 
-// Of light at infinity, the fluence; else intensity, where it is greatest. Relative to all others only.
+// Of light at infinity, what it sends through a surface; else intensity, where it is greatest. Relative to all others
+// only.
 double strength(const EmitterView& e, bool flat) {
   constexpr double pi = static_cast<double>(kPi);
   const double v = 1e3 * static_cast<double>(mean(e.value * 1e-3f));
@@ -171,7 +172,7 @@ double strength(const EmitterView& e, bool flat) {
       return v * static_cast<double>(e.area) * (flat ? 1 : 0.25);
     case EmitterView::Kind::constant:
     case EmitterView::Kind::environment:
-      return 4 * pi * v;
+      return pi * v;  // and not the fluence: half of it is met by directions that scattering draws
     default:
       return v;
   }

@@ -115,7 +115,7 @@ struct EmitterView {
 
 /// An emitter from afar: how much light it sends where nothing is in its way, to within a small factor.
 struct LampStrength {
-  float strength = 0;     ///< fluence of lights at infinity, else radiant intensity; relative to the scene's strongest
+  float strength = 0;  ///< irradiance of lights at infinity, else radiant intensity; relative to the scene's strongest
   bool infinite = false;  ///< the rest does not matter
   Vec3 center;
   float radius = 0;   ///< of a ball around it [unit]
@@ -123,7 +123,7 @@ struct LampStrength {
   float least = -1;   ///< ...where the cosine is above this; -1: everywhere
   bool flat = false;  ///< by the cosine
 
-  VIRGA_HD float fluenceAt(Vec3 p) const {
+  VIRGA_HD float lightAt(Vec3 p) const {
     if (infinite) return strength;
     constexpr float kAside = 0.1f;  // p may stand for places around it
     const Vec3 way = p - center;

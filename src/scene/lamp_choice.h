@@ -26,7 +26,7 @@ struct LampShares {
 
   VIRGA_HD LampShares(const SceneView& scene, Vec3 p) {
     for (int i = 0; i < scene.lamps.size; ++i) {
-      light[i] = scene.lamps[i].fluenceAt(p);
+      light[i] = scene.lamps[i].lightAt(p);
       sum += light[i];
       shining += scene.lamps[i].strength > 0;
     }

@@ -134,9 +134,10 @@ TEST_F(Sequence, WalksAreKeptFromFrameToFrame) {
                   "<transform name=\"to_world\">" + (empty ? "" : still.substr(inner, last - inner)) + "</transform>");
   }
   scratch_.write("still.xml", still);
-  const auto film = [&](const char* name, const std::string& retrace, const std::string& mode) {
+  const auto film = [&](const char* name, const std::string& retrace, const std::string& mode,
+                        const char* frames = "1..3") {
     const Ended r =
-        run({"render", "still.xml", "--frames", "1..3", "-m", "ims", "--set", "ims.walks=400", "--passes", "8", "--set",
+        run({"render", "still.xml", "--frames", frames, "-m", "ims", "--set", "ims.walks=400", "--passes", "8", "--set",
              "ims.retrace=" + retrace, "--set", "ims.mode=" + mode, "-o", std::string(name) + ".exr"});
     EXPECT_EQ(r.exitCode, 0) << r.err;
   };
@@ -151,6 +152,12 @@ TEST_F(Sequence, WalksAreKeptFromFrameToFrame) {
       const Image kept = picture(fileOfFrame("kept.exr", frame)), fresh = picture(fileOfFrame("fresh.exr", frame));
       EXPECT_NEAR(meanOf(kept) / meanOf(fresh), 1, 0.1) << mode << " " << frame;
       EXPECT_NE(kept.pixels, fresh.pixels) << "other walks";
+    }
+    // A sequence that goes on where another was interrupted begins with walks of its own.
+    film("resumed", "0.25", mode, "2..3");
+    for (int frame = 2; frame <= 3; ++frame) {
+      const Image kept = picture(fileOfFrame("kept.exr", frame)), resumed = picture(fileOfFrame("resumed.exr", frame));
+      EXPECT_NEAR(meanOf(resumed) / meanOf(kept), 1, 0.1) << mode << " " << frame;
     }
   }
 }
@@ -172,7 +179,11 @@ TEST_F(Sequence, WrongUseIsRefusedBeforeAnythingIsRendered) {
   scratch_.write("still.xml", R"(<scene version="3.0.0"><sensor type="perspective"/></scene>)");
   const Ended still = run({"render", "still.xml", "--frames", "1..2"});
   EXPECT_EQ(still.exitCode, 1);
-  EXPECT_NE(still.err.find("$frame"), std::string::npos) << still.err;
+  EXPECT_NE(
+      still.err.find("still.xml:1:2: error: all frames would be the same picture: nothing in this scene uses $frame"),
+      std::string::npos)
+      << still.err;
+  EXPECT_EQ(still.err.find("-D"), std::string::npos) << "what nobody wrote: " << still.err;
   EXPECT_EQ(scratch_.files(), (Names{"moving.xml", "smoke.0001.vol", "smoke.0002.vol", "smoke.0003.vol", "still.xml"}));
 }
 

@@ -40,6 +40,12 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
+/// Path of a file in a folder of this process's own, which is gone when the process ends.
+inline std::filesystem::path scratchFile(const std::string& name) {
+  static const ScratchFolder folder;
+  return folder / name;
+}
+
 inline std::string fileBytes(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};

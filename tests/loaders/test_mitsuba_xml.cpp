@@ -113,6 +113,8 @@ TEST(MitsubaXml, DefinesThatChangeNothingAreErrors) {
   EXPECT_EQ(error->details().notes, std::vector<std::string>{"the scene's variables: spp, res"});
   EXPECT_TRUE(errorOf([&] { parse(text, {.defines = {{"res", "4"}}}); })) << "declared but never used";
   EXPECT_FALSE(errorOf([&] { parse(text, {.defines = {{"spp", "4"}}}); }));
+  expectError("<[[scene]] version='3.0.0'><default name='frame' value='1'/></scene>",
+              "nothing in this scene uses $frame", {.frame = "0001"});
 }
 
 TEST(MitsubaXml, OldScenesAreModernised) {

@@ -2,10 +2,10 @@
 // Cameras and lamps exactly on the boundaries of media: pictures are those from a hair to either side.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 
+#include "image/scratch.h"
 #include "methods/rendering.h"
 #include "transport/tabled_lamps.h"
 #include "volume/volume_io.h"
@@ -34,7 +34,6 @@ class Boundaries : public ::testing::TestWithParam<End> {
     volume.indexToWorld = Matrix4::translation(-0.875, -0.875, -0.875) * Matrix4::scaling(0.25, 0.25, 0.25);
     writeVol(file_, volume);
   }
-  ~Boundaries() override { std::filesystem::remove(file_); }
 
   std::string medium(End end, double scale = 1) const {
     const std::string albedo = R"(<float name="albedo" value="0.9"/>)";
@@ -48,8 +47,7 @@ class Boundaries : public ::testing::TestWithParam<End> {
       <float name="scale" value="{}"/></medium></shape>)",
                        end == End::grid ? 1.5 : 1., file_.string(), albedo, scale);
   }
-  const std::filesystem::path file_ =
-      std::filesystem::temp_directory_path() / ("virga_boundaries." + std::to_string(::getpid()) + ".vol");
+  const std::filesystem::path file_ = scratchFile("grid.vol");
 };
 
 std::string camera(const std::string& origin, const std::string& target, double nearClip, double fieldOfView) {

@@ -143,12 +143,12 @@ class MediumText {
  private:
   std::string volumeOr(const std::string& constant, const char* parameter, const Grid& grid) const {
     if (grid.n == 0) return constant;
-    const std::string file = fmt::format("{}-{}-{}.vol", name_, index_, parameter);
+    const auto file = std::filesystem::path(directory_) / fmt::format("{}-{}-{}.vol", name_, index_, parameter);
     const bool grey =
         std::all_of(grid.values.begin(), grid.values.end(), [](Vector v) { return v.x == v.y && v.y == v.z; });
     const bool albedo = std::string_view(parameter) == "albedo";
-    writeGrid(std::filesystem::path(directory_) / file, grid, grey && !albedo ? 1 : 3);
-    return gridVolume(parameter, region_, file);
+    writeGrid(file, grid, grey && !albedo ? 1 : 3);
+    return gridVolume(parameter, region_, file.string());
   }
   std::string emission() const {
     const Medium& m = region_.medium;

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "image/scratch.h"
 #include "methods/rendering.h"
 #include "volume/volume_io.h"
 
@@ -26,8 +27,7 @@ std::array<stats::Moments, 3> channels(const Image& image) {
 }
 
 void expectRadiance(const std::string& elements, const std::array<double, 3>& truth, Layer layer, int passes = 64) {
-  const RenderSession session =
-      rendered(sceneOf(elements, ::testing::TempDir()), {.passes = passes, .layers = LayerMask::all()});
+  const RenderSession session = rendered(sceneOf(elements), {.passes = passes, .layers = LayerMask::all()});
   const auto beauty = channels(session.film().beauty()), own = channels(session.film().layer(layer));
   for (size_t c = 0; c < 3; ++c) {
     EXPECT_NEAR(own[c].mean(), truth[c], std::max(4 * own[c].standardError(), 1e-5 * truth[c])) << c;
@@ -66,11 +66,10 @@ std::string rampFile(const std::string& format) {
   for (int i = 0; i < kN * kN * kN; ++i) volume.values.push_back(2 * (static_cast<float>(i % kN) + 0.5f) / kN);
   volume.indexToWorld = Matrix4::translation(-1, -1, -1) * Matrix4::scaling(2.0 / kN, 2.0 / kN, 2.0 / kN) *
                         Matrix4::translation(0.5, 0.5, 0.5);
-  const std::string name = "ramp." + format;
-  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / name;
+  const std::filesystem::path path = scratchFile("ramp." + format);
   if (format == "vol") writeVol(path, volume);
   if (format == "vdb") writeVdb(path, volume);
-  return name;
+  return path.string();
 }
 
 TEST(Emission, OfAGrid) {

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "image/scratch.h"
+
 namespace virga::testing {
 namespace {
 
@@ -32,6 +34,24 @@ constexpr double kTailed = 0.05;
 constexpr double kTests = Estimates::kRegions * Estimates::kChannels;
 
 }  // namespace
+
+SceneSnapshot smokyRoom(const brute::Grid& density, double sigmaT, brute::Vector albedo) {
+  brute::World w;
+  w.eye = {0.5, 0.2, 3.6};
+  w.fieldOfView = 35;
+  w.size = 16;
+  w.maxDepth = 6;
+  w.rectangles = {floorAt(-1, 2, matt(0.6, 0.5, 0.4)), {{0, 0, -1.2}, {2, 0, 0}, {0, 2, 0}, matt(0.3, 0.5, 0.7)}};
+  // In frames lamps of more than eight points have small tables.
+  constexpr int kLamps = 3;
+  for (int i = 0; i < kLamps; ++i)
+    w.rectangles.push_back({{0, 1.2, (2. * i + 1) / kLamps - 1}, {1, 0, 0}, {0, 0, 1. / kLamps}, light(4, 3.5, 3)});
+  brute::Region box{.form = brute::Region::Form::box, .lo = {-0.8, -1, -0.9}, .hi = {0.9, 1.1, 0.8}, .medium = {}};
+  box.medium.sigmaT = sigmaT, box.medium.albedo = albedo, box.medium.density = density;
+  w.regions.push_back(box);
+  const ScratchFolder folder;
+  return sceneOf(brute::sceneElements(w, folder.path().string(), "smoke"), folder.path().string());
+}
 
 void Estimates::add(const Film& film, int replicate) {
   for (size_t l = 0; l < kLayerCount; ++l) {
@@ -134,7 +154,7 @@ void expectPower(const Estimates& a, const Estimates& truth, const std::vector<P
 
 void expectImsIsPath(const std::string& elements, const std::vector<Power>& powers, const Trials& trials,
                      const SettingsGrid& grid) {
-  const SceneSnapshot scene = sceneOf(elements, ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elements);
   const Estimates truth =
       estimates(scene, "path", {}, {.sets = 3 * trials.sets, .passes = trials.passes, .seed = trials.seed});
   Estimates all;

@@ -11,6 +11,9 @@
 /// whole pictures are independent of each other.
 namespace virga::testing {
 
+/// Smoke on a grid in a room that lamps on the ceiling light. [1/unit]
+SceneSnapshot smokyRoom(const brute::Grid& density, double sigmaT, brute::Vector albedo = {0.95, 0.9, 0.8});
+
 /// How much is computed: `sets` sessions of kReplicates replicates each, with `passes` passes a replicate.
 struct Trials {
   int sets = 20;

@@ -233,6 +233,8 @@ TEST(ImsSettings, WhatMakesNoSenseIsRefused) {
   refused({{"show", "compensation"}}, "error: --set ims.show=compensation needs ims.compensation=sampled");
   refused({{"show", "compensation"}, {"compensation", "none"}},
           "error: --set ims.show=compensation needs ims.compensation=sampled");
+  refused({{"retrace", "0.5"}, {"walks", "262145"}}, "error: --set ims.retrace=0.5 would keep nothing: ");
+  EXPECT_EQ(messageOf(scene, {{"retrace", "0.5"}, {"walks", "262144"}}), "accepted");
   refused({{"compensation", "some"}}, "error: --set ims.compensation: ");
   refused({{"visibilty", "none"}}, "error: method \"ims\" has no setting \"visibilty\"; did you mean \"visibility\"?");
 }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "methods/ims_checks.h"
 #include "methods/ims_scenes.h"
 #include "methods/instant_scattering/marched_light.h"
 #include "methods/instant_scattering/upsampling.h"
@@ -46,6 +47,19 @@ void expectNear(const std::string& elements, double tolerance, int passes) {
 TEST(ImsFast, LayersOfAPlumeAreNearTheTruth) { expectNear(plume(48), 0.02, 24); }
 TEST(ImsFast, LayersOfFogAreNearTheTruth) { expectNear(fog(48), 0.02, 24); }
 TEST(ImsFast, MirrorsAndGlassAreComputedInEachPixel) { expectNear(fog(32, R"(<bsdf type="dielectric"/>)"), 0.02, 24); }
+
+// In a small room, by many lights, of which few are nearer than the radius: what virtual lights in media weigh is seen,
+// most finely from media to surfaces, where a tenth too much would be.
+TEST(ImsFast, LayersOfSmokeThatVirtualLightsCarry) {
+  const SceneSnapshot scene = smokyRoom(virga::testing::plume(), 9);
+  const SettingValues settings = {{"mode", "fast"},  {"spacing", "1"}, {"samples", "1"},
+                                  {"walks", "1024"}, {"lights", "16"}, {"radius", "0.1"}};
+  const Estimates truth = estimates(scene, "path", {}, {.sets = 16, .passes = 8, .seed = 5});
+  const Estimates own = estimates(scene, "ims", settings, {.sets = 24, .seed = 6});
+  expectSame(own, truth, "fast");
+  expectPower(own, truth, {{Layer::mediaToSurface, 0.018}, {Layer::surfaceToMedia, 0.025}, {Layer::mediaToMedia, 0.03}},
+              "fast");
+}
 
 TEST(ImsFast, IsSaidToBeBiased) {
   RenderSession session(sceneOf(fog(8)), findMethod("ims"), {.settings = {.values = {{"mode", "fast"}}}});

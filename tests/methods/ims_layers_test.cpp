@@ -2,11 +2,11 @@
 // `ims` against `path`, layer by layer, over a hundredfold range of bounds and with both compensations.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 
 #include "image/image_io.h"
+#include "image/scratch.h"
 #include "methods/ims_checks.h"
 
 namespace virga {
@@ -170,31 +170,28 @@ TEST(ImsLayers, MediaThatGlow) {
 
 // --- a picture around the scene ---
 
-/// A sky with a low sun and a dim ground, in a file for as long as the tests run.
-struct SkyFile {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("virga_sky.{}.exr", ::getpid());
-  SkyFile() {
-    Image sky(32, 16);
-    for (int y = 0; y < 16; ++y)
-      for (int x = 0; x < 32; ++x) {
-        const bool sun = x >= 20 && x < 23 && y >= 3 && y < 6;
-        const Rgb above(0.3f, 0.5f, 1), below(0.1f, 0.08f, 0.05f);
-        sky.pixels[static_cast<size_t>(y * 32 + x)] = sun ? Rgb(30, 25, 15) : y < 8 ? above : below;
-      }
-    writeExr(path, sky);
-  }
-  ~SkyFile() { std::filesystem::remove(path); }
-};
+/// A sky with a low sun and a dim ground.
+std::string skyFile() {
+  Image sky(32, 16);
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 32; ++x) {
+      const bool sun = x >= 20 && x < 23 && y >= 3 && y < 6;
+      const Rgb above(0.3f, 0.5f, 1), below(0.1f, 0.08f, 0.05f);
+      sky.pixels[static_cast<size_t>(y * 32 + x)] = sun ? Rgb(30, 25, 15) : y < 8 ? above : below;
+    }
+  const std::filesystem::path path = scratchFile("sky.exr");
+  writeExr(path, sky);
+  return path.string();
+}
 
 // The room of the smoke without its lamp, open to the sky, which is seen beside it.
 TEST(ImsLayers, SmokeUnderASky) {
-  const SkyFile file;
   World w = smokeInRoom();
   w.fieldOfView = 60;
   w.rectangles.erase(w.rectangles.begin() + 1);
   const std::string sky = fmt::format(R"(<emitter type="envmap"><string name="filename" value="{}"/>
     <transform name="to_world"><rotate y="1" angle="40"/></transform></emitter>)",
-                                      file.path.string());
+                                      skyFile());
   expectImsIsPath(elementsOf(w) + sky,
                   {{Layer::emission, 0.01},
                    {Layer::directSurface, 0.01},
@@ -245,7 +242,7 @@ TEST(ImsLayers, APointASpotAndTheSun) {
 TEST(ImsLayers, ADepthTooManyIsNoticed) {
   World w = fogInRoom();
   w.maxDepth = 4;
-  const SceneSnapshot scene = sceneOf(elementsOf(w), ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elementsOf(w));
   const Estimates truth = estimates(scene, "path", {}, {.sets = 16});
   for (const char* depth : {"3", "5"}) {
     const Estimates wrong =

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "image/scratch.h"
 #include "methods/ims_checks.h"
 
 namespace virga {
@@ -162,7 +163,7 @@ TEST(ImsMaterials, Panes) {
 // A coarse mesh whose shading normals are far from its own: light walks meet the shading normal where eye paths do
 // not.
 TEST(ImsMaterials, ShadingNormals) {
-  const std::filesystem::path path = std::filesystem::path(::testing::TempDir()) / "ims-octahedron.obj";
+  const std::filesystem::path path = scratchFile("octahedron.obj");
   {
     std::ofstream file(path);
     const int corners[6][3] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};

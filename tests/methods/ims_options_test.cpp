@@ -38,7 +38,7 @@ const std::vector<Layer> kIndirect = {Layer::surfaceToSurface, Layer::mediaToSur
 class ImsOptionsTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    scene_ = sceneOf(brute::sceneElements(denseFog(), ::testing::TempDir(), "ims-options"));
+    scene_ = sceneOf(elementsOf(denseFog()));
     truth_ = estimates(scene_, "path", {}, {.sets = 60});
   }
   static void TearDownTestSuite() {
@@ -198,7 +198,7 @@ Difference againstExact(const char* transmittance, const brute::Grid& grid, doub
   w.regions.pop_back();
   w.regions[0].medium.sigmaT = sigmaT;
   w.regions[0].medium.density = grid;
-  const SceneSnapshot scene = sceneOf(elementsOf(w), ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elementsOf(w));
   const auto found = [&](const char* way, uint64_t seed) {
     return estimates(scene, "ims",
                      {{"walks", "1024"},
@@ -239,7 +239,7 @@ TEST(ImsBias, LightPassesSurfacesWhereNothingIsHidden) {
                   {{-0.2, 0, 0}, {0, 0, -1}, {0, 1.2, 0}, {.diffuse = {0.3, 0.3, 0.3}, .twoSided = true}},
                   {{-1.3, 0.2, 0}, {0, 0, -0.5}, {0, 0.5, 0}, light(5, 5, 5)}};
   w.eye = {2, 0.5, 3};
-  const SceneSnapshot scene = sceneOf(elementsOf(w), ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elementsOf(w));
   const auto found = [&](const char* visibility, uint64_t seed) {
     return estimates(scene, "ims", {{"walks", "1024"}, {"radius", "0.5"}, {"visibility", visibility}},
                      {.sets = 12, .seed = seed});
@@ -259,7 +259,7 @@ TEST(ImsRecursion, EndsWithManyVertices) {
   w.maxDepth = -1;
   w.regions[0].medium.albedo = w.regions[1].medium.albedo = {1, 1, 1};
   w.regions[0].medium.sigmaT = 4;
-  const SceneSnapshot scene = sceneOf(elementsOf(w), ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elementsOf(w));
   const RenderSession session = rendered(
       scene, {.passes = 1,
               .method = "ims",

@@ -2,10 +2,10 @@
 #include "methods/ims_scenes.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <filesystem>
 
+#include "image/scratch.h"
 #include "volume/procedural.h"
 #include "volume/volume_io.h"
 
@@ -20,24 +20,23 @@ std::string sensor(int size, float x, const char* medium = "") {
                      size, x, medium);
 }
 
-/// A volume on disk for as long as the tests run.
-struct SmokeFile {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("virga_ims.{}.vol", ::getpid());
-  SmokeFile() { writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 48})); }
-  ~SmokeFile() { std::filesystem::remove(path); }
-};
+std::string smokeFile() {
+  const std::filesystem::path path = scratchFile("smoke.vol");
+  writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 48}));
+  return path.string();
+}
 
 constexpr const char* kPlumeLamp =
     R"(<emitter type="point"><point name="position" x="-2.5" y="3" z="1.5"/><rgb name="intensity" value="50"/></emitter>)";
 
 /// The plume's medium; `name`: an attribute.
 std::string smoke(const char* name) {
-  static const SmokeFile file;
+  static const std::string file = smokeFile();
   return fmt::format(
       R"(<medium {} type="heterogeneous"><volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/>
         <transform name="to_world"><scale value="2"/><translate x="-1" y="-1" z="-1"/></transform></volume>
         <rgb name="albedo" value="0.9"/><float name="scale" value="12"/></medium>)",
-      name, file.path.string());
+      name, file);
 }
 
 }  // namespace

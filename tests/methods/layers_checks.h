@@ -9,7 +9,7 @@
 #include "methods/rendering.h"
 
 /// Layer by layer against an independent estimator. Pixels of both are independent, so their differences are, too:
-/// t-tests of the mean difference over the picture and its quarters, channel by channel.
+/// t-tests of the mean difference over the picture and its quarters, of each channel and of their mean.
 namespace virga::testing {
 
 using Picture = std::vector<brute::Layers>;
@@ -22,24 +22,34 @@ struct Effort {
   int passes = 640, samples = 3000;
 };
 
+/// The environment's VIRGA_LAYER_EFFORT: how many times as many passes and samples are made, by whose root all
+/// precisions that are asked for shrink; 1 if it is not set. bench/layers.py sets it.
+double thoroughness();
+/// So many, times that.
+int thorough(int count);
+
 /// What two pictures say about one layer.
 struct Finding {
-  double p = 1;          ///< of the worst of fifteen tests, times fifteen
-  double level = 0;      ///< mean over the picture
-  double precision = 0;  ///< standard error of the mean difference, relative to the level
+  double p = 1;           ///< of the worst of twenty tests, times twenty
+  double level = 0;       ///< mean over the picture
+  double difference = 0;  ///< of the means, relative to the level
+  double precision = 0;   ///< its standard error
 };
 
 Finding compared(const Picture& picture, Layer layer, const Picture& truth, Layer truthLayer);
 Finding compared(const Picture& picture, const Picture& truth, Layer layer);
 
-Picture pictureByPath(const std::string& elements, uint64_t seed = 1, int passes = Effort{}.passes);
-/// The world in a scene file; its grids are written beside it, under the name of the test.
+Picture pictureByPath(const std::string& elements, uint64_t seed = 1, int passes = thorough(Effort{}.passes));
+/// The world in a scene file; its grids are in files that the next world overwrites.
 std::string elementsOf(const brute::World& world);
 
 inline constexpr double kNoticed = 7;
 
-/// A layer that is to be there, and to what precision it is compared: kNoticed times that, over all of the picture, is
-/// seen to be noticed.
+/// The coarsest precision that may be asked for.
+inline constexpr double kCoarsest = 0.02;
+
+/// A layer that is to be there, and to what precision it is compared (with a thoroughness of 1): kNoticed times that,
+/// over all of the picture, is seen to be noticed.
 struct Power {
   Layer layer;
   double precision;
@@ -57,6 +67,7 @@ Picture brighter(Picture picture, Layer layer, double factor);
 
 enum class Compare { all, notEmission };
 
+/// All layers agree, and each that carries light is in the list of powers.
 void expectAgreement(const Picture& picture, const Picture& truth, const std::vector<Power>& powers,
                      Compare compare = Compare::all);
 void expectAgreement(const brute::World& world, const std::vector<Power>& powers,

@@ -69,7 +69,7 @@ World glossyInFog() {
   World w;
   w.eye = {0, 0.7, 4};
   w.spheres = {
-      {{-0.9, 0.9, 0.3}, 0.6, light(5, 5, 4)},
+      {{-0.9, 1, 0.2}, 0.9, light(2.5, 2.5, 2)},
       {{0.5, -0.4, 0.3},
        0.6,
        {.kind = Material::Kind::phong, .diffuse = {0.3, 0.1, 0.1}, .specular = {0.6, 0.6, 0.5}, .exponent = 12}}};
@@ -95,7 +95,8 @@ World glassAndMirrorInFog() {
   World w;
   w.eye = {0, 0.6, 4.5};
   w.rectangles = {floorAt(-1, 1.6, matt(0.7, 0.6, 0.5)),
-                  ceilingAt(1.3, 1.1, light(4, 4, 5)),
+                  ceilingAt(1.3, 1.5, light(2, 2, 2.5)),
+                  {{0, 0, -1.4}, {1.5, 0, 0}, {0, 1, 0}, matt(0.5, 0.6, 0.7)},
                   {{-1.3, 0, -0.2},
                    {0, 0, 0.8},
                    {0, 0.9, 0},
@@ -111,8 +112,8 @@ World overlappingMedia() {
   World w;
   w.eye = {0.4, 0.5, 4};
   w.sky = {0.5, 0.6, 0.8};
-  w.spheres = {{{-1.6, 1.4, 0.4}, 0.7, light(4, 3, 2)}};
-  w.rectangles = {floorAt(-1, 2, matt(0.5, 0.5, 0.5))};
+  w.spheres = {{{-2.1, 1.7, 0.5}, 1, light(2, 1.5, 1)}};
+  w.rectangles = {floorAt(-1, 2, matt(0.6, 0.6, 0.6)), {{0, -0.3, -1}, {1.8, 0, 0}, {0, 0.7, 0}, matt(0.6, 0.6, 0.6)}};
   w.regions = {{.lo = {-1.2, -1, -0.8}, .hi = {0.2, 0.6, 0.8}, .medium = {.sigmaT = 0.8, .albedo = {0.9, 0.5, 0.5}}},
                {.lo = {-0.3, -0.9, -0.7},
                 .hi = {1.3, 0.3, 0.7},
@@ -126,9 +127,9 @@ World overlappingMedia() {
                 .medium = {.sigmaT = 5, .albedo = {0.9, 0.9, 0.2}},
                 .within = 0},
                {.form = Region::Form::glassBall,
-                .lo = {0.6, -0.7, -0.3},
-                .hi = {1.2, -0.1, 0.3},
-                .medium = {.sigmaT = 2, .albedo = {0.9, 0.9, 0.9}},
+                .lo = {0.44, -0.85, -0.3},
+                .hi = {1.26, -0.03, 0.52},
+                .medium = {.sigmaT = 0.7, .albedo = {0.9, 0.9, 0.9}},
                 .within = 1}};
   return w;
 }
@@ -153,77 +154,93 @@ World colouredCloud() {
 // --- tests ---
 
 TEST(Layers, SmokeInRoom) {
-  expectAgreement(smokeInRoom(), {{Layer::emission, 0.01},
-                                  {Layer::directSurface, 0.01},
-                                  {Layer::directMedia, 0.015},
-                                  {Layer::surfaceToSurface, 0.01},
-                                  {Layer::mediaToSurface, 0.02},
-                                  {Layer::surfaceToMedia, 0.02},
-                                  {Layer::mediaToMedia, 0.015}});
+  expectAgreement(smokeInRoom(),
+                  {{Layer::emission, 0.002},
+                   {Layer::directSurface, 0.004},
+                   {Layer::directMedia, 0.009},
+                   {Layer::surfaceToSurface, 0.007},
+                   {Layer::mediaToSurface, 0.012},
+                   {Layer::surfaceToMedia, 0.02},
+                   {Layer::mediaToMedia, 0.009}},
+                  {}, {.passes = 800, .samples = 2500});
 }
 TEST(Layers, FogInRoomAndWhatIsWrongInIt) {
   const World world = fogInRoom();
-  const Picture truth = brute::render(world, Effort{}.samples, 1);
-  const Picture right = pictureByPath(elementsOf(world));
+  const Effort effort{.passes = 700, .samples = 1700};
+  const Picture truth = brute::render(world, thorough(effort.samples), 1);
+  const Picture right = pictureByPath(elementsOf(world), 1, thorough(effort.passes));
   expectAgreement(right, truth,
-                  {{Layer::emission, 0.02},
-                   {Layer::directSurface, 0.02},
-                   {Layer::directMedia, 0.01},
-                   {Layer::surfaceToSurface, 0.03},
-                   {Layer::mediaToSurface, 0.02},
-                   {Layer::surfaceToMedia, 0.01},
-                   {Layer::mediaToMedia, 0.01}});
+                  {{Layer::emission, 0.015},
+                   {Layer::directSurface, 0.017},
+                   {Layer::directMedia, 0.006},
+                   {Layer::surfaceToSurface, 0.017},
+                   {Layer::mediaToSurface, 0.011},
+                   {Layer::surfaceToMedia, 0.006},
+                   {Layer::mediaToMedia, 0.005}});
   World darker = world;
   darker.regions[0].medium.albedo = world.regions[0].medium.albedo * 0.97;
-  const Picture wrong = pictureByPath(elementsOf(darker));
+  const Picture wrong = pictureByPath(elementsOf(darker), 2, effort.passes / 2);
   EXPECT_LT(compared(wrong, truth, Layer::directMedia).p, kSuspicious) << "albedo";
   EXPECT_LT(compared(wrong, truth, Layer::mediaToMedia).p, kSuspicious) << "albedo";
   EXPECT_GT(compared(wrong, truth, Layer::directSurface).p, kSuspicious) << "the albedo has no part in it";
   EXPECT_LT(compared(right, Layer::mediaToSurface, truth, Layer::surfaceToMedia).p, kSuspicious) << "layers swapped";
 }
 TEST(Layers, StronglyForward) {
-  expectAgreement(forwardBall(), {{Layer::emission, 0.01},
-                                  {Layer::directSurface, 0.01},
-                                  {Layer::directMedia, 0.015},
-                                  {Layer::mediaToSurface, 0.02},
-                                  {Layer::surfaceToMedia, 0.03},
-                                  {Layer::mediaToMedia, 0.01}});
+  expectAgreement(forwardBall(),
+                  {{Layer::emission, 0.001},
+                   {Layer::directSurface, 0.003},
+                   {Layer::directMedia, 0.011},
+                   {Layer::mediaToSurface, 0.013},
+                   {Layer::surfaceToMedia, 0.02},
+                   {Layer::mediaToMedia, 0.006}},
+                  {}, {.passes = 1000, .samples = 3000});
 }
 TEST(Layers, GlossyInFog) {
-  expectAgreement(glossyInFog(), {{Layer::emission, 0.01},
-                                  {Layer::directSurface, 0.015},
-                                  {Layer::directMedia, 0.01},
-                                  {Layer::surfaceToSurface, 0.04},
-                                  {Layer::mediaToSurface, 0.02},
-                                  {Layer::surfaceToMedia, 0.03},
-                                  {Layer::mediaToMedia, 0.01}});
+  expectAgreement(glossyInFog(),
+                  {{Layer::emission, 0.002},
+                   {Layer::directSurface, 0.007},
+                   {Layer::directMedia, 0.005},
+                   {Layer::surfaceToSurface, 0.02},
+                   {Layer::mediaToSurface, 0.012},
+                   {Layer::surfaceToMedia, 0.019},
+                   {Layer::mediaToMedia, 0.008}},
+                  {}, {.passes = 640, .samples = 5000});
 }
 TEST(Layers, GlassAndMirrorInFog) {
-  expectAgreement(glassAndMirrorInFog(), {{Layer::emission, 0.01},
-                                          {Layer::directSurface, 0.01},
-                                          {Layer::directMedia, 0.01},
-                                          {Layer::causticSurface, 0.025},
-                                          {Layer::causticMedia, 0.025},
-                                          {Layer::mediaToSurface, 0.015},
-                                          {Layer::surfaceToMedia, 0.015},
-                                          {Layer::mediaToMedia, 0.01}});
+  expectAgreement(glassAndMirrorInFog(),
+                  {{Layer::emission, 0.002},
+                   {Layer::directSurface, 0.007},
+                   {Layer::directMedia, 0.003},
+                   {Layer::causticSurface, 0.02},
+                   {Layer::causticMedia, 0.02},
+                   {Layer::surfaceToSurface, 0.02},
+                   {Layer::mediaToSurface, 0.007},
+                   {Layer::surfaceToMedia, 0.009},
+                   {Layer::mediaToMedia, 0.005}},
+                  {}, {.passes = 900, .samples = 3000});
 }
 TEST(Layers, OverlappingMedia) {
-  expectAgreement(overlappingMedia(), {{Layer::emission, 0.01},
-                                       {Layer::directSurface, 0.01},
-                                       {Layer::directMedia, 0.01},
-                                       {Layer::causticMedia, 0.03},
-                                       {Layer::mediaToSurface, 0.01},
-                                       {Layer::surfaceToMedia, 0.01},
-                                       {Layer::mediaToMedia, 0.01}});
+  expectAgreement(overlappingMedia(),
+                  {{Layer::emission, 0.001},
+                   {Layer::directSurface, 0.003},
+                   {Layer::directMedia, 0.004},
+                   {Layer::causticSurface, 0.02},
+                   {Layer::causticMedia, 0.017},
+                   {Layer::surfaceToSurface, 0.01},
+                   {Layer::mediaToSurface, 0.005},
+                   {Layer::surfaceToMedia, 0.006},
+                   {Layer::mediaToMedia, 0.004}},
+                  {}, {.passes = 1400, .samples = 2000});
 }
 TEST(Layers, ColouredCloud) {
-  expectAgreement(colouredCloud(), {{Layer::emission, 0.01},
-                                    {Layer::directSurface, 0.01},
-                                    {Layer::directMedia, 0.01},
-                                    {Layer::mediaToSurface, 0.015},
-                                    {Layer::surfaceToMedia, 0.015},
-                                    {Layer::mediaToMedia, 0.015}});
+  expectAgreement(colouredCloud(),
+                  {{Layer::emission, 0.001},
+                   {Layer::directSurface, 0.005},
+                   {Layer::directMedia, 0.01},
+                   {Layer::mediaToSurface, 0.014},
+                   {Layer::surfaceToMedia, 0.017},
+                   {Layer::mediaToMedia, 0.011}},
+                  {}, {.passes = 640, .samples = 2500});
 }
 
 // --- lights that nothing meets by chance, as small lights that something does ---
@@ -232,7 +249,7 @@ std::string pointAt(const std::string& place) {
   return R"(<emitter type="point"><point name="position" )" + place + R"(<rgb name="intensity" value="5"/></emitter>)";
 }
 std::string smallSphereAt(const std::string& place) {
-  const double radius = 0.005;  // a larger one keeps fog from where the point's light is brightest
+  const double radius = 0.0005;  // light that starts at its surface has so much less fog before it
   return fmt::format(R"(<shape type="sphere"><point name="center" {}<float name="radius" value="{}"/>
     <emitter type="area"><rgb name="radiance" value="{}"/></emitter></shape>)",
                      place, radius, 5 / (M_PI * radius * radius));
@@ -243,13 +260,15 @@ TEST(Layers, PointLightIsASmallSphere) {
   World world = glossyInFog();
   world.spheres.erase(world.spheres.begin());
   const std::string elements = elementsOf(world), place = R"(x="-0.3" y="1.3" z="1.4"/>)";
-  expectAgreement(pictureByPath(elements + pointAt(place), 2), pictureByPath(elements + smallSphereAt(place)),
-                  {{Layer::directSurface, 0.01},
-                   {Layer::directMedia, 0.01},
-                   {Layer::surfaceToSurface, 0.03},
-                   {Layer::mediaToSurface, 0.03},
-                   {Layer::surfaceToMedia, 0.035},
-                   {Layer::mediaToMedia, 0.02}},
+  const int passes = thorough(1100);
+  expectAgreement(pictureByPath(elements + pointAt(place), 2, passes),
+                  pictureByPath(elements + smallSphereAt(place), 1, passes),
+                  {{Layer::directSurface, 0.004},
+                   {Layer::directMedia, 0.003},
+                   {Layer::surfaceToSurface, 0.014},
+                   {Layer::mediaToSurface, 0.012},
+                   {Layer::surfaceToMedia, 0.02},
+                   {Layer::mediaToMedia, 0.008}},
                   Compare::notEmission);
 }
 
@@ -258,17 +277,17 @@ TEST(Layers, PointLightIsASmallSphereInSmoke) {
   World world = smokeInRoom();
   world.rectangles.erase(world.rectangles.begin() + 1);
   const std::string elements = elementsOf(world), place = R"(x="-1.1" y="1.4" z="1"/>)";
-  const SceneSnapshot scene = sceneOf(elements + pointAt(place), ::testing::TempDir());
+  const SceneSnapshot scene = sceneOf(elements + pointAt(place));
   const TabledLamps lamps(*scene, tabledLampSide(*scene, world.size * world.size), {});
   ASSERT_TRUE(lamps.view().size > 0 && lamps.view()[0].present());
   const Picture truth = pictureByPath(elements + smallSphereAt(place));
   expectAgreement(pictureByPath(elements + pointAt(place), 2), truth,
-                  {{Layer::directSurface, 0.01},
-                   {Layer::directMedia, 0.01},
-                   {Layer::surfaceToSurface, 0.02},
-                   {Layer::mediaToSurface, 0.02},
-                   {Layer::surfaceToMedia, 0.02},
-                   {Layer::mediaToMedia, 0.02}},
+                  {{Layer::directSurface, 0.001},
+                   {Layer::directMedia, 0.007},
+                   {Layer::surfaceToSurface, 0.004},
+                   {Layer::mediaToSurface, 0.01},
+                   {Layer::surfaceToMedia, 0.016},
+                   {Layer::mediaToMedia, 0.01}},
                   Compare::notEmission);
   world.regions[0].medium.sigmaT *= 1.15;
   const Picture denser = pictureByPath(elementsOf(world) + pointAt(place), 3);
@@ -293,25 +312,27 @@ TEST(Layers, DirectionalLightIsAFarSphere) {
                              -toLight.x, -toLight.y, -toLight.z),
       2);
   expectAgreement(directional, sphere,
-                  {{Layer::directSurface, 0.01},
-                   {Layer::directMedia, 0.015},
-                   {Layer::surfaceToSurface, 0.01},
-                   {Layer::mediaToSurface, 0.02},
-                   {Layer::surfaceToMedia, 0.02},
-                   {Layer::mediaToMedia, 0.02}},
+                  {{Layer::directSurface, 0.001},
+                   {Layer::directMedia, 0.006},
+                   {Layer::surfaceToSurface, 0.003},
+                   {Layer::mediaToSurface, 0.009},
+                   {Layer::surfaceToMedia, 0.016},
+                   {Layer::mediaToMedia, 0.01}},
                   Compare::notEmission);
 }
 
 // A small disk shines with the cosine of the angle, and nested spots, each of which falls off between two angles, add
-// up to the cosine's interpolation.
+// up to the cosine's interpolation. Light that fog scatters back to the disk ends there, but passes the spots: in the
+// midst of the fog a radius of 0.05 takes 2 % more from media_to_media than one of 0.005 does. Outside of the picture,
+// like the point above.
 TEST(Layers, SpotsAreASmallDisk) {
   World world = glossyInFog();
   world.spheres.erase(world.spheres.begin());
   const std::string
       elements = elementsOf(world),
       pose =
-          R"(<transform name="to_world"><lookat origin="-0.9, 0.8, 0.4" target="0.5, -0.4, 0" up="0, 1, 0"/></transform>)";
-  const double radius = 0.02, step = M_PI / 24;
+          R"(<transform name="to_world"><lookat origin="-0.9, 1.3, 1.4" target="0.5, -0.4, 0" up="0, 1, 0"/></transform>)";
+  const double radius = 0.005, step = M_PI / 24;
   const std::string scaled =
       fmt::format(R"(<transform name="to_world"><scale value="{}"/>)", radius) + pose.substr(pose.find("<lookat"));
   const Picture disk = pictureByPath(elements + "<shape type=\"disk\">" + scaled +
@@ -325,12 +346,12 @@ TEST(Layers, SpotsAreASmallDisk) {
       <float name="cutoff_angle" value="{}"/></emitter>)",
                          5 * (std::cos(i * step) - std::cos((i + 1) * step)), i * 7.5, (i + 1) * 7.5);
   expectAgreement(pictureByPath(elements + spots, 2), disk,
-                  {{Layer::directSurface, 0.01},
+                  {{Layer::directSurface, 0.006},
                    {Layer::directMedia, 0.01},
-                   {Layer::surfaceToSurface, 0.02},
-                   {Layer::mediaToSurface, 0.02},
+                   {Layer::surfaceToSurface, 0.016},
+                   {Layer::mediaToSurface, 0.011},
                    {Layer::surfaceToMedia, 0.02},
-                   {Layer::mediaToMedia, 0.02}},
+                   {Layer::mediaToMedia, 0.01}},
                   Compare::notEmission);
 }
 

@@ -2,10 +2,10 @@
 // The same phase function said in different ways makes the same picture.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 
+#include "image/scratch.h"
 #include "methods/rendering.h"
 #include "scattering/phase.h"
 #include "volume/volume_io.h"
@@ -73,8 +73,7 @@ TEST(PhaseEquivalence, AnotherPhaseFunctionIsNoticed) {
 }
 
 TEST(PhaseEquivalence, AGridOfOneWeightIsThatWeight) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / ("virga_phase_equivalence." + std::to_string(::getpid()) + ".vol");
+  const std::filesystem::path file = scratchFile("weight.vol");
   DenseVolume volume;
   volume.nx = volume.ny = volume.nz = 2;
   volume.values.assign(8, 0.25f);
@@ -86,7 +85,6 @@ TEST(PhaseEquivalence, AGridOfOneWeightIsThatWeight) {
   const RenderSession byGrid = rendered(sceneOf(ball(blend(grid)))),
                       byNumber = rendered(sceneOf(ball(blend(R"(<float name="weight" value="0.25"/>)"))));
   EXPECT_EQ(largestDifference(byGrid.film().beauty(), byNumber.film().beauty()), 0);
-  std::filesystem::remove(file);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 // Values at the ends of their ranges and places that lie exactly on something.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -10,6 +9,7 @@
 
 #include "core/random.h"
 #include "core/warp.h"
+#include "image/scratch.h"
 #include "methods/rendering.h"
 #include "transport/media_walk.h"
 #include "volume/volume_io.h"
@@ -146,8 +146,6 @@ TEST(Robustness, AMediumThatIsNotThereIsInvisible) {
 
 class Grids : public ::testing::Test {
  protected:
-  ~Grids() override { std::filesystem::remove(file_); }
-
   // A ball filled by a grid of one value.
   std::string filled(float value, double scale) const {
     DenseVolume volume;
@@ -160,8 +158,7 @@ class Grids : public ::testing::Test {
                               scale, file_.string()),
                   "heterogeneous");
   }
-  const std::filesystem::path file_ =
-      std::filesystem::temp_directory_path() / ("virga_robustness." + std::to_string(::getpid()) + ".vol");
+  const std::filesystem::path file_ = scratchFile("filled.vol");
 };
 
 TEST_F(Grids, WithoutDensityAreInvisible) {
@@ -216,14 +213,11 @@ TEST(Robustness, ALampOnABoundaryIsJustBesideIt) {
 
 class Meshes : public ::testing::Test {
  protected:
-  ~Meshes() override { std::filesystem::remove(file_); }
-
   std::string obj(const std::string& text, const std::string& inside) const {
     std::ofstream(file_) << text;
     return fmt::format(R"(<shape type="obj"><string name="filename" value="{}"/>{}</shape>)", file_.string(), inside);
   }
-  const std::filesystem::path file_ =
-      std::filesystem::temp_directory_path() / ("virga_robustness." + std::to_string(::getpid()) + ".obj");
+  const std::filesystem::path file_ = scratchFile("mesh.obj");
 
   static constexpr const char* kCube =
       "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n";

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "image/scratch.h"
 #include "methods/rendering.h"
 
 namespace virga {
@@ -44,11 +45,10 @@ std::string homogeneous(const Coefficients& sigmaT, int channel) {
                      colour(sigmaT, channel), colour({0.95, 0.8, 0.99}, channel));
 }
 
-// Three channels of 4^3 voxels, or one of them, in a file. Its name is the test's own: they run side by side.
+// Three channels of 4^3 voxels, or one of them, in a file.
 std::string grid(int channel) {
-  const char* test = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  const std::string name = fmt::format("colours-{}{}.vol", test, channel);
-  std::ofstream out(::testing::TempDir() + "/" + name, std::ios::binary);
+  const std::filesystem::path path = scratchFile(fmt::format("colours{}.vol", channel));
+  std::ofstream out(path, std::ios::binary);
   const auto put = [&](auto value) { out.write(reinterpret_cast<const char*>(&value), sizeof value); };
   out.write("VOL\3", 4);
   for (const int32_t n : {1, 4, 4, 4, channel < 0 ? 3 : 1}) put(n);
@@ -59,7 +59,7 @@ std::string grid(int channel) {
       const float value = c == 2 && i % 3 == 0 ? 0 : toUnitFloat(bits) * (c == 0 ? 4.f : 1.f);
       if (channel < 0 || channel == c) put(value);
     }
-  return name;
+  return path.string();
 }
 
 std::string heterogeneous(const std::string& file, const Coefficients& scale, int channel) {
@@ -72,7 +72,7 @@ std::string heterogeneous(const std::string& file, const Coefficients& scale, in
 using Elements = std::function<std::string(int channel)>;
 
 Image picture(const std::string& elements, uint64_t seed, int passes) {
-  return rendered(sceneOf(elements, ::testing::TempDir()), {.passes = passes, .seed = seed}).film().beauty();
+  return rendered(sceneOf(elements), {.passes = passes, .seed = seed}).film().beauty();
 }
 
 // Each channel against its own grey picture, over quarters. Returns the largest deviation in standard errors.

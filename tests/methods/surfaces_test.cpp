@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "image/image_io.h"
+#include "image/scratch.h"
 #include "methods/rendering.h"
 
 namespace virga {
@@ -42,7 +43,7 @@ std::string number(const char* name, double value) {
 }
 
 Image picture(const std::string& elements, uint64_t seed, int passes) {
-  return rendered(sceneOf(sensor() + elements, ::testing::TempDir()), {.passes = passes, .seed = seed}).film().beauty();
+  return rendered(sceneOf(sensor() + elements), {.passes = passes, .seed = seed}).film().beauty();
 }
 
 /// Of the difference of two pictures: the mean over each quarter in standard errors, largest in size; and the error of
@@ -129,12 +130,10 @@ TEST(Surfaces, APaneThatIsNoneMakesTheFogInsideBrighterOrDarker) {
 // --- Textures
 
 std::string bitmap(const char* name, const char* file, const char* more = "") {
-  return fmt::format(R"(<texture name="{}" type="bitmap"><string name="filename" value="{}"/>{}</texture>)", name, file,
-                     more);
+  return fmt::format(R"(<texture name="{}" type="bitmap"><string name="filename" value="{}"/>{}</texture>)", name,
+                     scratchFile(file).string(), more);
 }
-void write(const char* file, const Image& image) {
-  writeExr(std::filesystem::path(::testing::TempDir()) / file, image);
-}
+void write(const char* file, const Image& image) { writeExr(scratchFile(file), image); }
 
 TEST(Surfaces, ABitmapOfOneColourIsThatColourBitForBit) {
   write("flat.exr", Image(4, 3, Rgb(0.8f, 0.4f, 0.1f)));
@@ -209,12 +208,10 @@ TEST(Surfaces, ATexturedWallIsAMosaicOfPlainOnes) {
 
 // --- Cylinder
 
-// A tube of 400 flat strips, in a file of the test's own.
-std::string tubeFile() {
-  return fmt::format("tube-{}.obj", ::testing::UnitTest::GetInstance()->current_test_info()->name());
-}
+// A tube of 400 flat strips.
+std::string tubeFile() { return scratchFile("tube.obj").string(); }
 void writeTube(bool closed) {
-  FILE* out = std::fopen((std::filesystem::path(::testing::TempDir()) / tubeFile()).c_str(), "w");
+  FILE* out = std::fopen(tubeFile().c_str(), "w");
   constexpr int kSides = 400;
   for (int i = 0; i < kSides; ++i) {
     const double phi = 2 * 3.14159265358979 * i / kSides;

@@ -11,14 +11,16 @@
 namespace virga {
 namespace {
 
+enum Lamp : size_t { panel, point, spot, dark, sky };  // lamps on shapes come first
+
 SceneSnapshot fourLampsAndADarkOne() {
   return test::build(R"(
-    <emitter type="point"><point name="position" x="4"/><rgb name="intensity" value="100"/></emitter>
+    <emitter type="point"><point name="position" x="4" y="0" z="0"/><rgb name="intensity" value="100"/></emitter>
     <emitter type="spot"><transform name="to_world"><lookat origin="0, 2, 0" target="0, 0, 0" up="1, 0, 0"/></transform>
       <rgb name="intensity" value="20"/><float name="cutoff_angle" value="20"/></emitter>
     <emitter type="point"><rgb name="intensity" value="0"/></emitter>
     <emitter type="constant"><rgb name="radiance" value="0.1"/></emitter>
-    <shape type="rectangle"><transform name="to_world"><scale value="0.1"/><translate z="-2"/></transform>
+    <shape type="rectangle"><transform name="to_world"><scale value="0.1"/><translate x="0" y="0" z="-2"/></transform>
       <emitter type="area"><rgb name="radiance" value="50"/></emitter></shape>)");
 }
 
@@ -42,30 +44,33 @@ TEST(LampChoice, IsDrawnWithItsProbability) {
       drawn[static_cast<size_t>(choice.emitter)] += 1. / kDraws;
     }
     for (size_t i = 0; i < shares.size(); ++i) EXPECT_NEAR(drawn[i], shares[i], 1e-3) << i;
-    EXPECT_EQ(shares[2], 0) << "a dark lamp";
-    for (const size_t shines : {0, 1, 3, 4}) EXPECT_GT(shares[shines], 0.06) << "something may be in the way of others";
+    EXPECT_EQ(shares[dark], 0) << "a dark lamp";
+    for (const size_t shines : {panel, point, spot, sky})
+      EXPECT_GT(shares[shines], 0.06) << "something may be in the way of others";
   }
 }
 
 TEST(LampChoice, FollowsTheLight) {
   const SceneSnapshot scene = fourLampsAndADarkOne();
-  // At the origin the fluences are 100 / 16, 20 / 4, 4 pi / 10 and 50 * 0.04 / 4.
+  // At the origin they send 100 / 16, 20 / 4, pi / 10 and 50 * 0.04 / 4.
   const std::vector<double> middle = sharesAt(scene->view, {0, 0, 0});
-  const double sum = 100. / 16 + 20. / 4 + 0.4 * 3.14159265 + 50 * 0.04 / 4;
-  EXPECT_NEAR(middle[0], 0.75 * (100. / 16) / sum + 0.0625, 1e-3);
-  EXPECT_NEAR(middle[1], 0.75 * (20. / 4) / sum + 0.0625, 1e-3);
-  EXPECT_NEAR(middle[3], 0.75 * (0.4 * 3.14159265) / sum + 0.0625, 1e-3);
-  EXPECT_NEAR(middle[4], 0.75 * (50 * 0.04 / 4) / sum + 0.0625, 1e-2);
-  EXPECT_GT(sharesAt(scene->view, {3.9f, 0, 0})[0], 0.8) << "beside the point light";
-  EXPECT_GT(sharesAt(scene->view, {0, 1.9f, 0})[1], 0.8) << "in the beam";
-  EXPECT_LT(sharesAt(scene->view, {0.5f, 1.9f, 0})[1], 0.75) << "beside the beam";
-  EXPECT_LT(sharesAt(scene->view, {0, 0, -2.2f})[4], sharesAt(scene->view, {0, 0, -1.8f})[4]) << "behind the panel";
+  const double sum = 100. / 16 + 20. / 4 + 0.1 * 3.14159265 + 50 * 0.04 / 4;
+  EXPECT_NEAR(middle[point], 0.75 * (100. / 16) / sum + 0.0625, 1e-3);
+  EXPECT_NEAR(middle[spot], 0.75 * (20. / 4) / sum + 0.0625, 1e-3);
+  EXPECT_NEAR(middle[sky], 0.75 * (0.1 * 3.14159265) / sum + 0.0625, 1e-3);
+  EXPECT_NEAR(middle[panel], 0.75 * (50 * 0.04 / 4) / sum + 0.0625, 1e-2);
+  EXPECT_GT(sharesAt(scene->view, {3.9f, 0, 0})[point], 0.8) << "beside the point light";
+  EXPECT_GT(sharesAt(scene->view, {0, 1.9f, 0})[spot], 0.8) << "in the beam";
+  EXPECT_LT(sharesAt(scene->view, {0.8f, 1.4f, 0})[spot], 0.3) << "beside the beam";
+  EXPECT_LT(sharesAt(scene->view, {0, 0, -2.2f})[panel], sharesAt(scene->view, {0, 0, -1.8f})[panel])
+      << "behind the panel";
 }
 
 TEST(LampChoice, OfManyIsByPower) {
   std::string lamps;
   for (int i = 0; i < 40; ++i)
-    lamps += "<emitter type=\"point\"><point name=\"position\" x=\"" + std::to_string(i) + "\"/></emitter>";
+    lamps +=
+        "<emitter type=\"point\"><point name=\"position\" x=\"" + std::to_string(i) + "\" y=\"0\" z=\"0\"/></emitter>";
   const SceneSnapshot scene = test::build(lamps);
   for (int i = 0; i < 40; ++i) EXPECT_NEAR(emitterProbability(scene->view, {3, 0.1f, 0}, i), 1. / 40, 1e-5);
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
 
 #include "core/random.h"
 #include "image/image_io.h"
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 
@@ -352,22 +352,18 @@ TEST(ConstantLight, SurroundsEverything) {
   expectIrradiance(*scene, {}, {0, 0, 1}, 2 * kPiDouble, "constant");
 }
 
-/// A picture in a file, gone at the end, and a scene around which it stands.
+/// A scene around which a picture stands.
 class Surroundings {
  public:
   explicit Surroundings(const Image& image, const std::string& inside = "") {
-    path_ = std::filesystem::temp_directory_path() / fmt::format("virga_surroundings_{}.exr", getpid());
-    writeExr(path_, image);
+    const std::filesystem::path path = scratchFile("surroundings.exr");
+    writeExr(path, image);
     scene = test::build(fmt::format("<emitter type=\"envmap\"><string name=\"filename\" value=\"{}\"/>{}</emitter>",
-                                    path_.string(), inside));
+                                    path.string(), inside));
   }
-  ~Surroundings() { std::filesystem::remove(path_); }
   const EmitterView& emitter() const { return scene->view.emitters[0]; }
 
   SceneSnapshot scene;
-
- private:
-  std::filesystem::path path_;
 };
 
 Image noisy(int width, int height) {

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -12,6 +11,7 @@
 
 #include "core/random.h"
 #include "image/image_io.h"
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 
@@ -51,7 +51,7 @@ std::array<double, 3> throughTheScene(const std::string& elements, std::array<do
 
 /// A picture of which the radiance is known in closed form all over the sphere: 2 + cos(angle from +y).
 std::string skyFile() {
-  const auto path = std::filesystem::temp_directory_path() / fmt::format("virga-emitted-ray-{}.exr", getpid());
+  const auto path = scratchFile("sky.exr");
   Image image(64, 257);
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) {

@@ -6,13 +6,13 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include <array>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 #include "transport/defence.h"
@@ -26,12 +26,6 @@ using Density = std::function<float(Vec3)>;
 
 class KeptWalksTest : public ::testing::Test {
  protected:
-  KeptWalksTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) / fmt::format("virga_kept_walks_{}", ::getpid())) {
-    std::filesystem::create_directories(folder_);
-  }
-  ~KeptWalksTest() override { std::filesystem::remove_all(folder_); }
-
   /// A room with a lamp, smoke in its middle and, in a corner that overlaps it, coloured fog.
   SceneSnapshot room(const Density& density, const std::string& fog = "0.3, 0.6, 1.2", double albedo = 0.8) {
     const std::string name = write(density, 10);
@@ -49,7 +43,7 @@ class KeptWalksTest : public ::testing::Test {
       <medium name="interior" type="homogeneous"><rgb name="sigma_t" value="{}"/><float name="albedo" value="0.9"/>
       </medium></shape>)",
                     albedo, name, fog),
-        folder_.string());
+        folder_.path().string());
   }
 
   /// Smoke of 64^3 voxels above a small floor, in a cube or declared by the sensor.
@@ -63,7 +57,7 @@ class KeptWalksTest : public ::testing::Test {
     const std::string cube = R"(<shape type="cube"><transform name="to_world"><scale value="8"/></transform>
       <bsdf type="null"/><ref id="smoke" name="interior"/></shape><sensor type="perspective"/>)";
     const std::string sensor = R"(<sensor type="perspective"><ref id="smoke" name="medium"/></sensor>)";
-    return buildScene(test::describe(medium + (inCube ? cube : sensor), folder_.string()));
+    return buildScene(test::describe(medium + (inCube ? cube : sensor), folder_.path().string()));
   }
 
  private:
@@ -76,11 +70,11 @@ class KeptWalksTest : public ::testing::Test {
               density((Vec3(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)) + Vec3(0.5f)) /
                       static_cast<float>(size)));
     const std::string name = fmt::format("smoke{}.vol", ++files_);
-    writeVol(folder_ / name, volume);
+    writeVol(folder_.path() / name, volume);
     return name;
   }
 
-  std::filesystem::path folder_;
+  ScratchFolder folder_;
   int files_ = 0;
 };
 
@@ -143,11 +137,14 @@ TEST_F(KeptWalksTest, CarryWhatFreshOnesCarryWhateverTheMediaBecome) {
     const char* what;
     SceneSnapshot before, after;
     double precision;
+    int later = 1;      ///< frames after the change
+    float retrace = 0;  ///< in each
   };
   const Case cases[] = {
       {"the same", room(stripes), room(stripes), 0.02},
       {"in place", room(stripes), room([](Vec3 p) { return 1.5f - stripes(p); }), 0.03},
       {"into empty space", room(left), room(moved), 0.04},
+      {"the same, half of them traced anew", room(left), room(moved), 0.04, 2, 0.25f},
       {"out of nothing", room(none), room(stripes), 0.03},
       {"vanishing", room(stripes), room(none), 0.02},
       {"another colour, another albedo", room(stripes, "0.6, 0.6, 1.2", 0.1), room(stripes, "1.2, 0.5, 0", 0.9), 0.03},
@@ -159,7 +156,8 @@ TEST_F(KeptWalksTest, CarryWhatFreshOnesCarryWhateverTheMediaBecome) {
     const Moments kept = momentsOf(kSets, ++seed, [&](const SampleId& id) {
       KeptWalks walks;
       walks.lights(*c.before, kWalks, id, 0, 0);
-      return walks.lights(*c.after, kWalks, id, 1, 0);
+      for (int frame = 1; frame < c.later; ++frame) walks.lights(*c.after, kWalks, id, frame, c.retrace);
+      return walks.lights(*c.after, kWalks, id, c.later, c.retrace);
     });
     const Moments stale =
         momentsOf(kSets, ++seed, [&](const SampleId& id) { return KeptWalks().lights(*c.before, kWalks, id, 0, 0); });

@@ -5,13 +5,13 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 #include "transport/virtual_lights.h"
@@ -284,7 +284,7 @@ TEST(LightWalk, RoughMetalNeverGains) {
 // proportion to cos(t), on directions above both planes, and sends it out by the true cosine: cos(t) (1 + cos(t)) / 2
 // of the flux. (Veach 1997, 5.3. A walk without his correction would carry (1 + cos(t)) / 2.)
 TEST(LightWalk, ShadingNormalsScatterAsTheyDoTowardTheEye) {
-  const auto path = std::filesystem::temp_directory_path() / fmt::format("virga-plate-{}.obj", getpid());
+  const auto path = scratchFile("plate.obj");
   const double tilt = 40 * kPiDouble / 180, cutoff = 3 * kPiDouble / 180, beam = 2.9 * kPiDouble / 180;
   std::ofstream(path) << fmt::format(
       "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn {} 0 {}\nf 1//1 2//1 3//1\nf 1//1 3//1 4//1\n", std::sin(tilt),
@@ -295,7 +295,6 @@ TEST(LightWalk, ShadingNormalsScatterAsTheyDoTowardTheEye) {
           fmt::format(R"(<shape type="obj"><string name="filename" value="{}"/>{}</shape>)", path.string(),
                       diffuse(1, 1, 1)),
       60'000);
-  std::filesystem::remove(path);
   const double flux = 2 * kPiDouble * (1 - (std::sin(cutoff) - std::sin(beam)) / (cutoff - beam));
   expectMean(m, flux * std::cos(tilt) * (1 + std::cos(tilt)) / 2, 0.01, "tilted");
 }

@@ -5,12 +5,12 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 #include "transport/fields.h"
@@ -129,7 +129,7 @@ struct ByDepth {
 
 // Coloured smoke under a lamp: the flux that is scattered at each depth, and how high.
 TEST(MarchedFlight, WalksCarryTheSameFlux) {
-  const auto path = std::filesystem::temp_directory_path() / fmt::format("virga-marched-{}.vol", getpid());
+  const auto path = scratchFile("smoke.vol");
   writeVol(path, makeProcedural(ProceduralKind::smoke, {.resolution = 32}));
   const SceneSnapshot scene = test::build(fmt::format(R"(
     <emitter type="point"><point name="position" x="0.5" y="0.5" z="0.5"/></emitter>
@@ -138,7 +138,6 @@ TEST(MarchedFlight, WalksCarryTheSameFlux) {
         <volume name="sigma_t" type="gridvolume"><string name="filename" value="{}"/></volume>
         <rgb name="albedo" value="0.9, 0.8, 0.7"/><float name="scale" value="60"/></medium></shape>)",
                                                       path.string()));
-  std::filesystem::remove(path);
   const ByDepth tracked(*scene, FlightMode::tracking), marched(*scene, FlightMode::marching);
   for (int d = 0; d < ByDepth::kDepths; ++d)
     for (const auto& [a, b] :

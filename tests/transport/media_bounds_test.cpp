@@ -4,11 +4,9 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
 
 #include "core/random.h"
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "transport/virtual_lights.h"
 #include "volume/volume_io.h"
@@ -18,23 +16,20 @@ namespace {
 
 class MediaBoundsTest : public ::testing::Test {
  protected:
-  MediaBoundsTest()
-      : folder_(std::filesystem::path(::testing::TempDir()) / fmt::format("virga_media_bounds_{}", ::getpid())) {
-    std::filesystem::create_directories(folder_);
+  MediaBoundsTest() {
     constexpr int kSize = 16;
     DenseVolume volume{kSize, kSize, kSize, {}, {}};
     for (int i = 0; i < kSize * kSize * kSize; ++i) volume.values.push_back(i % kSize < kSize / 2 ? 1.f : 0.f);
     writeVol(folder_ / "half.vol", volume);
   }
-  ~MediaBoundsTest() override { std::filesystem::remove_all(folder_); }
 
   SceneSnapshot build(const std::string& elements, const std::string& inSensor = "") const {
     return buildScene(
-        test::describe(elements + R"(<sensor type="perspective">)" + inSensor + "</sensor>", folder_.string()));
+        test::describe(elements + R"(<sensor type="perspective">)" + inSensor + "</sensor>", folder_.path().string()));
   }
 
  private:
-  std::filesystem::path folder_;
+  ScratchFolder folder_;
 };
 
 /// A cube of smoke, filled where x is below its middle.

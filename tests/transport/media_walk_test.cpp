@@ -5,12 +5,12 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 
 #include "core/warp.h"
+#include "image/scratch.h"
 #include "scene/scenes.h"
 
 namespace virga {
@@ -38,16 +38,12 @@ std::string boxVolume(const Bounds& b, int sigmaT) {
 /// A folder with meshes, gone at the end.
 class Folder {
  public:
-  Folder() : path_(std::filesystem::temp_directory_path() / fmt::format("virga_media_{}", getpid())) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() { std::filesystem::remove_all(path_); }
-  std::string path() const { return path_.string(); }
+  std::string path() const { return folder_.path().string(); }
   /// All boxes in one mesh.
   void writeBoxes(const std::string& name, const std::vector<Bounds>& boxes) const {
     static constexpr int kTriangles[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
                                               {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-    std::ofstream file(path_ / name);
+    std::ofstream file(folder_ / name);
     int first = 1;
     for (const Bounds& b : boxes) {
       for (int i = 0; i < 8; ++i) file << fmt::format("v {} {} {}\n", b.corner(i).x, b.corner(i).y, b.corner(i).z);
@@ -57,7 +53,7 @@ class Folder {
   }
 
  private:
-  std::filesystem::path path_;
+  ScratchFolder folder_;
 };
 
 std::string meshVolume(const std::string& file, int sigmaT, const std::string& transform = "") {

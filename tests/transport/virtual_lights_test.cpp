@@ -5,11 +5,11 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
 
+#include "image/scratch.h"
 #include "scene/scenes.h"
 #include "stats/stats.h"
 #include "volume/volume_io.h"
@@ -242,32 +242,26 @@ TEST(WalkStarts, LightFromInfinityGetsThroughWhereFogIsClear) {
     }
 }
 
-/// A volume of ones on disk for as long as it lives.
-struct OnesFile {
-  std::filesystem::path path = std::filesystem::temp_directory_path() / fmt::format("virga_ones.{}.vol", ::getpid());
-  OnesFile() { writeVol(path, {2, 2, 2, std::vector<float>(8, 1.f), {}}); }
-  ~OnesFile() { std::filesystem::remove(path); }
-};
-
 /// A camera that declares a grid of ones in a cube around 0, in [-2, 2]^3.
-SceneSnapshot gridScene(const OnesFile& file, const std::string& elements, double sigmaT, double edge = 4) {
+SceneSnapshot gridScene(const std::string& elements, double sigmaT, double edge = 4) {
+  const std::filesystem::path file = scratchFile("ones.vol");
+  writeVol(file, {2, 2, 2, std::vector<float>(8, 1.f), {}});
   return buildScene(test::describe(
       elements + fmt::format(R"(<medium type="heterogeneous" id="grid"><volume name="sigma_t" type="gridvolume">
       <string name="filename" value="{}"/><transform name="to_world"><translate value="-0.5"/><scale value="{}"/></transform>
       </volume><float name="albedo" value="1"/><float name="scale" value="{}"/></medium>
     <sensor type="perspective" id="camera"><transform name="to_world"><lookat origin="0, 0, 9" target="0, 0, 0" up="0, 1, 0"/>
     </transform><ref name="medium" id="grid"/></sensor>)",
-                             file.path.string(), edge, sigmaT)));
+                             file.string(), edge, sigmaT)));
 }
 
 // The shape, if there is one, is smaller than the grid: light is lost if walks start at shapes alone.
 TEST(WalkStarts, LightFromInfinityMeetsAllOfAGridWithoutEnd) {
-  const OnesFile file;
   const std::string block =
       R"(<shape type="sphere"><float name="radius" value="0.05"/><bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf></shape>)";
   for (const std::string& shapes : {std::string(), block})
     for (const double sigmaT : {0.1, 1.0}) {
-      const SceneSnapshot scene = gridScene(file, shapes + kSun, sigmaT);
+      const SceneSnapshot scene = gridScene(shapes + kSun, sigmaT);
       stats::Moments scattered, far;
       for (uint32_t set = 0; set < 60; ++set) {
         const VirtualLights all = traceVirtualLights(*scene, {.walks = 2000, .maxDepth = 1}, {7, set, 0, 0});
@@ -292,8 +286,7 @@ TEST(WalkStarts, ServeScenesThatLightFromInfinityMeetsAlike) {
   EXPECT_TRUE(serve(thin, thick) && serve(thick, thin));
   EXPECT_FALSE(serve(thin, clear) || serve(clear, thin) || serve(blue, thick));
   EXPECT_TRUE(serve(endlessScene(ball + kPoint, "3, 2, 0"), endlessScene(ball + kPoint, "3, 2, 1")));
-  const OnesFile file;
-  const SceneSnapshot large = gridScene(file, ball + kSky, 1, 6), small = gridScene(file, ball + kSky, 2, 5);
+  const SceneSnapshot large = gridScene(ball + kSky, 1, 6), small = gridScene(ball + kSky, 2, 5);
   EXPECT_TRUE(serve(large, small));
   EXPECT_FALSE(serve(small, large)) << "walks would not meet all of it";
 }

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "core/warp.h"
+#include "methods/instant_scattering/lamp_places.h"
 #include "methods/instant_scattering/light_visibility.h"
 
 namespace virga {
@@ -52,7 +53,7 @@ Vec2 placeOnSphere(const FixedNumbers& numbers, int group, int k, int count) {
 ChosenLamp chosenLamp(const SceneView& scene, const FixedNumbers& numbers, int group, int k) {
   const int count = numbers.onSurface(group);
   ChosenLamp lamp = numbers.lamp(scene, group, k, count);
-  if (numbers.lamps[group].round) lamp.u = placeOnSphere(numbers, group, k, count);
+  if (numbers.lamps[group].round && numbers.lamps[group].chosen < 0) lamp.u = placeOnSphere(numbers, group, k, count);
   return lamp;
 }
 
@@ -76,10 +77,25 @@ void FrameLamps::chooseGroups(const SceneView& scene) {
   }
 }
 
+void FrameLamps::choosePlaces(const SceneView& scene, uint32_t pass) {
+  for (LampGroup& group : groups_) {
+    if (group.lamp == LampGroup::kDrawn) continue;
+    const EmitterView& emitter = scene.emitters[group.lamp];
+    if (emitter.kind != EmitterView::Kind::area || emitter.isRectangle) continue;
+    const ShapeView::Kind shape = scene.surfaces[emitter.shape].kind;
+    if (shape != ShapeView::Kind::mesh && shape != ShapeView::Kind::cylinder) continue;
+    const LampPlaces own(scene, emitter, group.points, pass);
+    group.round = own.facesApart();
+    group.chosen = static_cast<int>(chosen_.size());
+    chosen_.insert(chosen_.end(), own.places().begin(), own.places().end());
+  }
+}
+
 FrameLamps::FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token& stop) {
   const SceneView& view = scene.view;
   alone_ = std::all_of(view.emitters.begin(), view.emitters.end(), isAimedAt);
   if (view.hasLamps()) chooseGroups(view);
+  choosePlaces(view, pass);
   const FixedNumbers own = numbers(pass);
   std::vector<Vec3> places;
   for (int group = 0; group < own.groups(); ++group)

@@ -22,9 +22,7 @@ class FrameLamps {
   /// A stop leaves tables undefined.
   FrameLamps(const Scene& scene, uint32_t pass, const std::stop_token& stop);
 
-  FixedNumbers numbers(uint32_t pass) const {
-    return {pass, {groups_.data(), static_cast<int>(groups_.size())}, places_};
-  }
+  FixedNumbers numbers(uint32_t pass) const { return {pass, viewOf(groups_), places_, viewOf(chosen_)}; }
 
   std::span<const LampPoint> points() const { return points_; }
   /// The light of any pixel can be found by packets: all lamps are points or areas.
@@ -61,8 +59,10 @@ class FrameLamps {
   static constexpr int kMostInFog = 4;
 
   void chooseGroups(const SceneView& scene);
+  void choosePlaces(const SceneView& scene, uint32_t pass);
 
   std::vector<LampGroup> groups_;
+  std::vector<Vec2> chosen_;  ///< places on lamps that are meshes or cylinders
   int places_ = FixedNumbers::kMostPlaces;
   std::vector<LampPoint> points_;  ///< of the first group, of the second...
   bool alone_ = true, marches_ = false;

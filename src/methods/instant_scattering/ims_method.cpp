@@ -37,13 +37,14 @@ class ImsMethod final : public Method {
     if (options.mode == ImsOptions::Mode::frame) {
       const SampleId id{seed_ ^ kWalkSeed, 0, 0, static_cast<uint32_t>(index)};
       const bool completed = frame_.pass(*scene_, options, id, walks_, stop, frame);
-      if (frame_.lights()) overlay_ = dotsOf(frame_.lights()->virtualLights());
+      if (frame_.lights())
+        overlay_ = dotsOf(frame_.lights()->lights(), [](const FrameLights::Light& l) { return *l.vertex; });
       return {.completed = completed, .biased = true};
     }
     const auto replicate = static_cast<uint32_t>(index % Film::kReplicates);
     const auto sample = static_cast<uint32_t>(index / Film::kReplicates);
     const VirtualLights lights = lightsOf(index, options, {seed_ ^ kWalkSeed, replicate, 0, sample}, stop);
-    overlay_ = dotsOf(lights);
+    overlay_ = dotsOf(lights.lights, [](const LightVertex& v) { return v; });
     const bool maps = options.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
     if (maps && options.visibility.points > 0 && points_.cells() == 0)
       points_ = SurfacePoints(scene_->view, options.visibility.points, seed_);
@@ -83,11 +84,13 @@ class ImsMethod final : public Method {
     id.stream = scene_->camera.pixelStream(x, y);
     return id;
   }
-  static Overlay dotsOf(const VirtualLights& lights) {
-    constexpr size_t kMost = 4096;
+  /// The first of them: of a pass of `exact` there may be a hundred thousand.
+  template <class Lights, class VertexOf>
+  static Overlay dotsOf(const Lights& lights, const VertexOf& vertexOf) {
+    constexpr size_t kMost = 8192;
     Overlay overlay;
-    for (size_t i = 0; i < std::min(kMost, lights.lights.size()); ++i) {
-      const LightVertex& v = lights.lights[i];
+    for (size_t i = 0; i < std::min(kMost, static_cast<size_t>(lights.size())); ++i) {
+      const LightVertex v = vertexOf(lights[i]);
       overlay.dots.push_back({v.p, v.kind == VertexKind::surface ? Rgb(0, 1, 0) : Rgb(1, 0, 0)});
     }
     return overlay;

@@ -23,8 +23,8 @@ inline constexpr SettingInfo kImsSettings[] = {
     {"aim", "0; frame: 0.5",
      "share of the walks that start toward the media, where these do not fill the scene: few walks find a small cloud"},
     {"retrace", "1",
-     "part of the walks that is traced anew in a frame where only media change; the others are kept (frame: at least "
-     "this part, more where media change fast)"},
+     "part of the walks that is traced anew in a frame where only media change; the others are kept, 262144 of a "
+     "frame's first passes (above 0: at least this part, more where media change fast)"},
     {"lights", "8; 1 where a medium is heterogeneous; frame: 1300",
      "single virtual lights that light a vertex, where no number of walks is given; frame: lights that are kept of "
      "all"},

@@ -8,6 +8,7 @@
 #include "methods/instant_scattering/eye_march.h"
 #include "methods/instant_scattering/ims_method.h"
 #include "methods/settings_reader.h"
+#include "transport/kept_walks.h"
 #include "transport/lamp_tables.h"
 
 namespace virga {
@@ -129,6 +130,10 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.retrace = reader.share("retrace").value_or(o.retrace);
   if (o.retrace < 1 && o.flights == FlightMode::marching)
     throw Error("--set ims.retrace needs ims.walk_flights=tracking: kept walks have flights of their own");
+  if (o.retrace < 1 && walks_ && !WalkStore::keeps(0, *walks_))
+    throw Error(fmt::format("--set ims.retrace={} would keep nothing: a pass has {} walks, and at most {} are kept",
+                            settings.values.at("retrace"), *walks_, WalkStore::kMostWalks),
+                {{}, "leave it out, or ask for fewer walks and more passes", {}});
   o.amount.walks = reader.integer("paths", 0).value_or(0);
   lights_ = reader.integer("lights", 1);
   const bool isFrame = o.mode == ImsOptions::Mode::frame;

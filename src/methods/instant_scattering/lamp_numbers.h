@@ -52,6 +52,7 @@ struct LampGroup {
   int lamp = kDrawn;   ///< index of the emitter
   int points = 1;      ///< on surfaces; a power of two, places() at most
   bool round = false;  ///< most places see a part of the points alone: all of them light each place in media
+  int chosen = -1;     ///< where its points are among those that were chosen; -1: they are an even set
 };
 
 /// The same in every pixel (`frame`): points of an even set, turned by a number of the pass. Nothing shimmers; what an
@@ -62,6 +63,7 @@ struct FixedNumbers {
   uint32_t pass;
   View<LampGroup> lamps = {};
   int placesOfEach = kMostPlaces;
+  View<Vec2> chosen = {};  ///< places on lamps, one behind the other
 
   VIRGA_HD float shift() const { return turned(0.5f, 0.6180340f); }
   /// In the pixel.
@@ -71,8 +73,10 @@ struct FixedNumbers {
   VIRGA_HD int onSurface(int group) const { return lamps[group].points; }
   VIRGA_HD int places() const { return placesOfEach; }
   VIRGA_HD ChosenLamp lamp(const SceneView& scene, int group, int k, int count) const {
-    if (lamps[group].lamp != LampGroup::kDrawn)
-      return {lamps[group].lamp, static_cast<float>(count), placeOnLamp(k, count)};
+    const LampGroup& own = lamps[group];
+    if (own.lamp != LampGroup::kDrawn)
+      return {own.lamp, static_cast<float>(count),
+              own.chosen < 0 ? placeOnLamp(k, count) : chosen[own.chosen + k % own.points]};
     // Of all groups' points together, each group has every so many.
     const int all = count * groups(), number = k * groups() + group;
     return chooseLamp(scene, choiceOf(number, all), placeOnLamp(number, all), all);
