@@ -17,7 +17,7 @@ LampTableSetting::LampTableSetting(const SettingsReader& reader, std::string_vie
 }
 
 int LampTableSetting::nodes(const SceneView& scene, int usual) const {
-  const int nodes = usual == 0 ? 0 : given_.value_or(usual);
+  const int nodes = given_.value_or(usual);
   if (lampTableBytes(scene, nodes) > LampTables::kMostBytes)
     throw Error(fmt::format("--set {}.lamp_table={}: the tables would take more than 1 GB", method_, nodes),
                 {{}, "choose fewer nodes, or 0 for none", {}});

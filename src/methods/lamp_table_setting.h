@@ -12,7 +12,7 @@ class LampTableSetting {
   LampTableSetting() = default;
   LampTableSetting(const SettingsReader& reader, std::string_view method);
 
-  /// In force for a scene where `usual` nodes are a good choice; 0 where that is 0.
+  /// In force for a scene that may have tables and where `usual` nodes are a good choice.
   int nodes(const SceneView& scene, int usual) const;
 
  private:

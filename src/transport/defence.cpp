@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "scene/scene_parts.h"
+#include "transport/media_bounds.h"
 
 namespace virga {
 namespace {
@@ -71,6 +72,75 @@ constexpr float kFloor = 0.7f;
 /// Of the mean extinction since the walks were drawn.
 constexpr float kMostGrowth = 2;
 
+/// How much extinction there was, and how much has come or gone.
+struct ExtinctionChange {
+  double all = 0, changed = 0;
+
+  void add(Rgb then, Rgb now, double volume) {
+    for (int c = 0; c < 3; ++c) {
+      all += static_cast<double>(then[c]) * volume;
+      changed += static_cast<double>(std::fabs(now[c] - then[c])) * volume;
+    }
+  }
+  float share() const {
+    if (!(changed > 0)) return 0;
+    return all > 0 ? static_cast<float>(std::min(1., changed / all)) : 1;
+  }
+};
+
+bool isWithin(const std::vector<Bounds>& places, Vec3 p) {
+  return std::any_of(places.begin(), places.end(), [&](const Bounds& b) {
+    return p.x >= b.lo.x && p.y >= b.lo.y && p.z >= b.lo.z && p.x <= b.hi.x && p.y <= b.hi.y && p.z <= b.hi.z;
+  });
+}
+
+/// Does a point lie in a coarse cell that is not empty?
+bool isFilled(const MediumView& medium, Vec3 p) {
+  if (!isGrid(medium)) return false;
+  const Vec3 q = medium.worldToDensity.point(p);
+  return medium.density.supports(q) && medium.density.majorant.cellAt(q) > 0;
+}
+
+/// Number n of an additive sequence in [0, 1)^3 (Roberts 2018: powers of the root of x^4 = x + 1).
+Vec3 spreadPoint(uint32_t n) {
+  const auto part = [n](double step) { return static_cast<float>(std::fmod(0.5 + step * n, 1)); };
+  return {part(0.8191725133961645), part(0.6710436067037893), part(0.5497004779019703)};
+}
+
+/// At points in the filled cells of `in`, which is one of the two: small smoke in a large grid has as many as any
+/// other.
+template <class LeaveOut>
+void compareCells(const MediumView& in, const std::vector<Bounds>& places, const LeaveOut& leaveOut,
+                  const MediumView& then, const MediumView& now, ExtinctionChange& change) {
+  constexpr int kPoints = 8192;  // at least, in all
+  if (!isGrid(in)) return;
+  const CoarseGridView& cells = in.density.majorant;
+  int filled = 0;
+  visitFilledCells(cells, [&](Vec3, float) { ++filled; });
+  const int each = (kPoints + filled - 1) / std::max(1, filled);
+  const Affine toWorld = in.worldToDensity.inverse();
+  const Vec3 size = cells.cellSize;
+  const float cell = std::fabs(dot(toWorld.x * size.x, cross(toWorld.y * size.y, toWorld.z * size.z)));
+  const double volume = static_cast<double>(cell) / each;
+  uint32_t n = 0;
+  visitFilledCells(cells, [&](Vec3 lo, float) {
+    for (int i = 0; i < each; ++i) {
+      const Vec3 p = toWorld.point(lo + spreadPoint(n++) * size);
+      if (isWithin(places, p) && !leaveOut(p)) change.add(then.sigmaTAt(p), now.sigmaTAt(p), volume);
+    }
+  });
+}
+
+ExtinctionChange compareInBox(const Bounds& box, const MediumView& then, const MediumView& now) {
+  constexpr uint32_t kPoints = 4096;
+  ExtinctionChange change;
+  for (uint32_t n = 0; n < kPoints && !box.empty(); ++n) {
+    const Vec3 p = box.lo + box.extent() * spreadPoint(n);
+    change.add(then.sigmaTAt(p), now.sigmaTAt(p), 1);
+  }
+  return change;
+}
+
 }  // namespace
 
 std::vector<Rgb> meanExtinctions(const Scene& scene) {
@@ -84,7 +154,7 @@ Defence defenceOf(const Scene& scene, const std::vector<Rgb>& extinctions) {
   const std::vector<float> across = extents(scene);
   for (size_t m = 0; m < across.size(); ++m) {
     const MediumView& medium = scene.view.media[static_cast<int>(m)];
-    const bool grid = !medium.homogeneous && medium.density.kind != GridView::Kind::constant;
+    const bool grid = isGrid(medium);
     DefensiveRates r{1 / across[m], mean(extinctions[m]) * (grid ? kFloor : 1), 0, {}};
     defence.spread.push_back(grid ? spreadOut(medium.density.mean) : std::vector<float>());
     if (grid) {
@@ -105,21 +175,21 @@ bool outgrown(const std::vector<Rgb>& now, const std::vector<Rgb>& then) {
 }
 
 float changeOfMedia(const Scene& before, const Scene& next) {
-  constexpr int kPoints = 16;  // in each direction
-  const std::vector<Bounds> bounds = boundsOfEach(next);
   float change = 0;
-  for (size_t m = 0; m < bounds.size(); ++m) {
-    const MediumView &then = before.view.media[static_cast<int>(m)], &now = next.view.media[static_cast<int>(m)];
-    const Bounds& where = bounds[m].empty() ? next.view.bounds : bounds[m];
-    const auto place = [](int n) { return (static_cast<float>(n % kPoints) + 0.5f) / kPoints; };
-    double all = 0, changed = 0;
-    for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
-      const Vec3 p = where.lo + where.extent() * Vec3(place(i), place(i / kPoints), place(i / kPoints / kPoints));
-      const Rgb a = then.sigmaTAt(p), b = now.sigmaTAt(p);
-      for (int c = 0; c < 3; ++c)
-        all += static_cast<double>(a[c]), changed += static_cast<double>(std::fabs(a[c] - b[c]));
-    }
-    if (changed > 0) change = std::max(change, all > 0 ? static_cast<float>(std::min(1., changed / all)) : 1);
+  for (int m = 0; m < next.view.media.size; ++m) {
+    const MediumView &then = before.view.media[m], &now = next.view.media[m];
+    const std::vector<Bounds> was = placesOf(before, m), is = placesOf(next, m);
+    ExtinctionChange inCells;
+    compareCells(
+        then, was, [](Vec3) { return false; }, then, now, inCells);
+    compareCells(
+        now, is, [&](Vec3 p) { return isFilled(then, p) && isWithin(was, p); }, then, now, inCells);
+    change = std::max(change, inCells.share());
+    if (endsByItself(then) && endsByItself(now)) continue;
+    Bounds all;
+    for (const std::vector<Bounds>* places : {&was, &is})
+      for (const Bounds& b : *places) all.extend(b);
+    change = std::max(change, compareInBox(all, then, now).share());
   }
   return change;
 }

@@ -17,7 +17,7 @@ struct EquiangularSegment {
   int medium = -1;           ///< -1: there is none
   bool largeLights = false;  ///< to be aimed at, too
   Ray ray;
-  Vec3 lampsFor;         ///< the place for whose light a lamp to aim at is chosen
+  Vec3 lampsFor = {};    ///< the place for whose light a lamp to aim at is chosen
   float t0 = 0, t1 = 0;  ///< t1 may be infinite
   float sigmaT = 0;      ///< [1/unit] of the densest channel
   bool grey = true;

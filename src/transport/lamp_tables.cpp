@@ -12,20 +12,8 @@ namespace {
 /// A wider square of directions would waste its corners: all around is better.
 constexpr float kMostReach = 1.5f;
 
-/// What the cells of a grid fill that are not empty, in the world.
-void extendByGrid(const MediumView& medium, Bounds& bounds) {
-  const CoarseGridView& cells = medium.density.majorant;
-  Bounds filled;
-  for (int k = 0; k < cells.nz; ++k)
-    for (int j = 0; j < cells.ny; ++j)
-      for (int i = 0; i < cells.nx; ++i) {
-        if (!(cells.cell(i, j, k) > 0)) continue;
-        const Vec3 lo =
-            cells.origin + Vec3(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) * cells.cellSize;
-        filled.extend(lo), filled.extend(lo + cells.cellSize);
-      }
-  if (!filled.empty()) bounds.extend(boundsInWorld(medium, filled));
-}
+/// Of tables, in either direction.
+constexpr int kFewNodes = 32, kManyNodes = 256;
 
 bool isPointLike(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::spot;
@@ -87,18 +75,10 @@ void fillDirection(const Scene& scene, const LampTable& table, const MediaState&
 
 }  // namespace
 
-Bounds filledBounds(const Scene& scene) {
-  Bounds bounds;
-  for (const MediumView& medium : scene.view.media) extendByGrid(medium, bounds);
-  if (!mediaAreBounded(scene)) return bounds;
-  const Bounds within = scene.boundaryRays->bounds();
-  return {max(bounds.lo, within.lo), min(bounds.hi, within.hi)};
-}
-
 LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop) {
   const SceneView& view = scene.view;
-  if (lampTableSide(view) == 0) return;
-  const Bounds bounds = filledBounds(scene);
+  if (!mayHaveLampTables(view)) return;
+  const Bounds bounds = boundsOfMedia(scene);
   if (bounds.empty()) return;
   const int endless = endlessMedium(scene), channels = channelsOf(view);
   for (const EmitterView& emitter : view.emitters) {
@@ -116,18 +96,33 @@ LampTables::LampTables(const Scene& scene, int side, const std::stop_token& stop
   }
 }
 
-int lampTableSide(const SceneView& scene) {
-  constexpr int kFew = 32, kMany = 256;
-  constexpr size_t kMostByDefault = 128 << 20;
+bool mayHaveLampTables(const SceneView& scene) {
   const int lamps = lampsOf(scene);
-  const bool bounded = std::all_of(scene.media.begin(), scene.media.end(), endsByItself);
-  if (lamps == 0 || lamps > LampTables::kMostLamps || scene.media.size == 0 || !bounded) return 0;
-  float voxels = 0;
-  for (const MediumView& medium : scene.media)
-    voxels = std::max(voxels, maxComponent(medium.density.supportHi - medium.density.supportLo));
-  int side = static_cast<int>(clamp(1.5f * voxels, kFew, kMany));
-  while (side > kFew && lampTableBytes(scene, side) > kMostByDefault) side /= 2;
-  return side;
+  return lamps > 0 && lamps <= LampTables::kMostLamps && scene.media.size > 0 &&
+         std::all_of(scene.media.begin(), scene.media.end(), endsByItself);
+}
+
+float wantedLampTableSide(const Scene& scene) {
+  if (!mayHaveLampTables(scene.view)) return 0;
+  const float across = maxComponent(boundsOfMedia(scene).extent());
+  float wanted = 0;
+  for (int m = 0; m < scene.view.media.size; ++m) {
+    const GridView& grid = scene.view.media[m].density;
+    Bounds own;
+    for (const Bounds& place : placesOf(scene, m)) own.extend(place);
+    if (own.empty()) continue;
+    const float alone = clamp(1.5f * maxComponent(grid.supportHi - grid.supportLo), kFewNodes, kManyNodes);
+    wanted = std::max(wanted, alone * std::max(1.f, across / std::max(maxComponent(own.extent()), 1e-6f * across)));
+  }
+  return wanted;
+}
+
+int lampTableSide(const Scene& scene) {
+  constexpr size_t kMostByDefault = 128 << 20;
+  const float wanted = wantedLampTableSide(scene);
+  int side = static_cast<int>(std::min(wanted, float{kManyNodes}));
+  while (side > kFewNodes && lampTableBytes(scene.view, side) > kMostByDefault) side /= 2;
+  return 2 * static_cast<float>(side) >= wanted ? side : 0;
 }
 
 size_t lampTableBytes(const SceneView& scene, int side) {

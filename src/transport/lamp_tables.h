@@ -95,11 +95,15 @@ class LampTables {
   std::vector<std::vector<float>> depths_;
 };
 
-/// A box around the cells of all grids that are not empty, as far as media reach.
-Bounds filledBounds(const Scene& scene);
-/// Nodes in either direction that do justice to the scene's grids: one and a half for each voxel of the largest, but at
-/// least 32 and at most 256. 0 where there can be no tables.
-int lampTableSide(const SceneView& scene);
+/// Are all media grids that end by themselves, and is there a point or spot lamp, but not too many?
+bool mayHaveLampTables(const SceneView& scene);
+/// Nodes in either direction that do justice to each of the scene's grids: one and a half for each of its voxels, but
+/// at least 32 and at most 256 of them across it, and the more of them the less of all media it is. However many these
+/// are. 0 where there can be no tables.
+float wantedLampTableSide(const Scene& scene);
+/// The same, if half as many are within 256 and 128 MB; otherwise 0: where small grids lie far apart marching is
+/// better.
+int lampTableSide(const Scene& scene);
 /// What tables of that side take [bytes].
 size_t lampTableBytes(const SceneView& scene, int side);
 

@@ -1,42 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "transport/media_bounds.h"
 
-#include "core/octahedral.h"
-#include "transport/media_walk.h"
+#include <algorithm>
+
+#include "scene/scene_parts.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
 namespace {
 
-/// Calls visit(t0, t1, ray) for stretches of media along a ray from p, but for where grids hold nothing.
-template <class Visit>
-void visitStretches(const SceneView& view, const EmbreeRays& rays, MediaRay r, float tMax, const Visit& visit) {
-  walkMedia(view, rays, r, tMax, [&](float t0, float t1) {
-    for (int i = 0; i < r.media.count(); ++i) {
-      const MediumView& medium = view.media[r.media.medium(i)];
-      ClippedRange in{t0, t1};
-      if (!medium.homogeneous && !(medium.density.background > 0))
-        in = clipToBox(medium.worldToDensity.point(r.ray.o), medium.worldToDensity.vector(r.ray.d),
-                       medium.density.supportLo, medium.density.supportHi, t0, t1);
-      if (in.t0 < in.t1) visit(in.t0, in.t1, r);
-    }
-    return true;
-  });
+constexpr Bounds kEverywhere{Vec3(-kInfinity), Vec3(kInfinity)};
+
+Bounds common(const Bounds& a, const Bounds& b) { return {max(a.lo, b.lo), min(a.hi, b.hi)}; }
+bool contains(const Bounds& outer, const Bounds& inner) { return common(outer, inner) == inner; }
+
+/// The cells of a grid that are not empty, as far as its values reach, in index coordinates.
+Bounds filledInGrid(const GridView& grid) {
+  Bounds filled;
+  visitFilledCells(grid.majorant,
+                   [&](Vec3 lo, float) { filled.extend(lo), filled.extend(lo + grid.majorant.cellSize); });
+  return common(filled, {grid.supportLo, grid.supportHi});
 }
 
-/// Where boundaries say that media may be; everywhere, if there are media outside of them.
-Bounds whereMediaMayBe(const Scene& scene) {
-  const bool within =
-      endlessMedium(scene) == MediaState::kNone && std::none_of(scene.view.surfaces.begin(), scene.view.surfaces.end(),
-                                                                [](const ShapeView& s) { return s.media.declared(); });
-  return within ? scene.boundaryRays->bounds() : scene.view.bounds;
+/// Where a medium could be, wherever it is declared.
+Bounds ownBounds(const MediumView& medium) {
+  if (!endsByItself(medium)) return kEverywhere;
+  const Bounds filled = filledInGrid(medium.density);
+  return filled.empty() ? Bounds() : boundsInWorld(medium, filled);
+}
+
+/// Calls visit(media, bounds of the shape) for all shapes.
+template <class Visit>
+void visitShapes(const Scene& scene, const Visit& visit) {
+  const Scene::Parts& parts = *scene.parts;
+  for (size_t i = 0; i < parts.boundaries.size(); ++i) visit(parts.boundaries[i], parts.boundaryShapes[i]->bounds);
+  for (size_t i = 0; i < parts.surfaces.size(); ++i) visit(parts.surfaces[i].media, parts.surfaceShapes[i]->bounds);
+}
+
+/// As far as media without end may matter: beyond all shapes, lamps and values of grids by twice what these span.
+Bounds farBounds(const Scene& scene) {
+  const SceneView& view = scene.view;
+  Bounds near = view.bounds;  // without shapes: the camera's place
+  if (view.surfaces.size == 0 && view.boundaries.size == 0)
+    for (const EmitterView& e : view.emitters)
+      if (e.isLocal()) near.extend(e.position);
+  for (const MediumView& m : view.media)
+    if (isGrid(m)) near.extend(boundsInWorld(m, {m.density.supportLo, m.density.supportHi}));
+  const float across = length(near.extent()), beyond = across > 0 ? 2 * across : 1e3f;
+  return {near.lo - Vec3(beyond), near.hi + Vec3(beyond)};
+}
+
+/// Where shapes and the sensor say that a medium is.
+std::vector<Bounds> declaredPlaces(const Scene& scene, int medium) {
+  std::vector<Bounds> places;
+  bool everywhere = endlessMedium(scene) == medium;
+  visitShapes(scene, [&](const MediumTransition& media, const Bounds& shape) {
+    if (media.interior != medium) return;
+    if (media.closed) places.push_back(shape);
+    everywhere |= !media.closed;
+  });
+  // The exterior of a shape ends with one around it that the same medium fills, if there is one.
+  const size_t filled = places.size();
+  visitShapes(scene, [&](const MediumTransition& media, const Bounds& shape) {
+    const auto isAround = [&](const Bounds& place) { return contains(place, shape); };
+    if (media.exterior == medium)
+      everywhere |= std::none_of(places.begin(), places.begin() + static_cast<std::ptrdiff_t>(filled), isAround);
+  });
+  return everywhere ? std::vector<Bounds>{kEverywhere} : places;
+}
+
+Bounds joined(Bounds a, const Bounds& b) {
+  a.extend(b);
+  return a;
+}
+
+/// How little two boxes belong together: 0 where they have a point in common, or else what they span together, over
+/// what the smaller one does.
+float apart(const Bounds& a, const Bounds& b) {
+  if (overlap(a, b)) return 0;
+  const float least = std::min(length(a.extent()), length(b.extent()));
+  return length(joined(a, b).extent()) / std::max(least, 1e-12f);
 }
 
 }  // namespace
 
-bool endsByItself(const MediumView& medium) {
-  return !medium.homogeneous && medium.density.kind != GridView::Kind::constant && !(medium.density.background > 0);
-}
+bool isGrid(const MediumView& medium) { return !medium.homogeneous && medium.density.kind != GridView::Kind::constant; }
+
+bool endsByItself(const MediumView& medium) { return isGrid(medium) && !(medium.density.background > 0); }
 
 Bounds boundsInWorld(const MediumView& medium, const Bounds& inGrid) {
   const Affine toWorld = medium.worldToDensity.inverse();
@@ -45,37 +95,41 @@ Bounds boundsInWorld(const MediumView& medium, const Bounds& inGrid) {
   return bounds;
 }
 
-bool mediaAreBounded(const Scene& scene) {
-  const SceneView& view = scene.view;
-  return view.cameraMedia.base() == MediaState::kNone &&
-         std::none_of(view.surfaces.begin(), view.surfaces.end(),
-                      [](const ShapeView& s) { return s.media.declared(); }) &&
-         std::all_of(view.boundaries.begin(), view.boundaries.end(),
-                     [](const MediumTransition& t) { return t.closed; });
+std::vector<Bounds> placesOf(const Scene& scene, int medium) {
+  const MediumView& view = scene.view.media[medium];
+  const Bounds own = ownBounds(view);
+  std::vector<Bounds> places;
+  for (const Bounds& declared : declaredPlaces(scene, medium)) {
+    const Bounds place = common(own, declared);
+    if (!place.empty()) places.push_back(place == kEverywhere ? farBounds(scene) : place);
+  }
+  return places;
 }
 
 Bounds boundsOfMedia(const Scene& scene) {
-  constexpr int kPoints = 3, kDirections = 12;  // an octahedral map of these
-  if (scene.view.media.size == 0) return {};
-  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const int endless = endlessMedium(scene);
-  Bounds where = whereMediaMayBe(scene);
-  if (where.empty()) where = {Vec3(-1), Vec3(1)};
-  // Media without end, and no shapes among them: as far as may matter.
-  const float most = scene.view.bounds.empty() ? 1e3f : 2 * length(scene.view.bounds.extent());
-  const auto place = [](int n) { return (static_cast<float>(n % kPoints) + 0.5f) / kPoints; };
-  Bounds media;
-  for (int i = 0; i < kPoints * kPoints * kPoints; ++i) {
-    const Vec3 p = where.lo + where.extent() * Vec3(place(i), place(i / kPoints), place(i / kPoints / kPoints));
-    const MediaState state = mediaAt(scene, p, endless);
-    for (int n = 0; n < kDirections * kDirections; ++n) {
-      const Vec3 d = octahedralDirection({n % kDirections, n / kDirections}, kDirections);
-      visitStretches(scene.view, rays, {{p, d}, state, 0}, most, [&](float t0, float t1, const MediaRay& r) {
-        media.extend(r.ray.at(t0)), media.extend(r.ray.at(t1));
-      });
-    }
+  Bounds bounds;
+  for (int m = 0; m < scene.view.media.size; ++m)
+    for (const Bounds& place : placesOf(scene, m)) bounds.extend(place);
+  return bounds;
+}
+
+std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most) {
+  constexpr float kApart = 2;
+  constexpr size_t kTooMany = 64;
+  std::vector<Bounds> boxes;
+  for (int m = 0; m < scene.view.media.size; ++m)
+    for (const Bounds& place : placesOf(scene, m)) boxes.push_back(place);
+  if (boxes.size() > kTooMany) return {boundsOfMedia(scene)};
+  for (;;) {
+    float least = kInfinity;
+    size_t first = 0, second = 0;
+    for (size_t i = 0; i < boxes.size(); ++i)
+      for (size_t j = i + 1; j < boxes.size(); ++j)
+        if (const float a = apart(boxes[i], boxes[j]); a < least) least = a, first = i, second = j;
+    if (boxes.size() < 2 || (least > kApart && boxes.size() <= most)) return boxes;
+    boxes[first].extend(boxes[second]);
+    boxes.erase(boxes.begin() + static_cast<std::ptrdiff_t>(second));
   }
-  return media;
 }
 
 }  // namespace virga

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "transport/media_bounds.h"
 #include "transport/virtual_lights.h"
 
 namespace virga {
@@ -27,16 +28,10 @@ struct FilledCell {
 
 std::vector<FilledCell> filledCells(const SceneView& scene) {
   std::vector<FilledCell> filled;
-  for (int m = 0; m < scene.media.size; ++m) {
-    const CoarseGridView& cells = scene.media[m].density.majorant;
-    for (int k = 0; k < cells.nz; ++k)
-      for (int j = 0; j < cells.ny; ++j)
-        for (int i = 0; i < cells.nx; ++i) {
-          const Vec3 cell(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k));
-          const float majorant = cells.cell(i, j, k);
-          if (majorant > 0) filled.push_back({m, cells.origin + cell * cells.cellSize, majorant});
-        }
-  }
+  for (int m = 0; m < scene.media.size; ++m)
+    visitFilledCells(scene.media[m].density.majorant, [&](Vec3 lo, float majorant) {
+      filled.push_back({m, lo, majorant});
+    });
   return filled;
 }
 
@@ -96,7 +91,7 @@ TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& st
   if (view.chromatic || side == 0) return;
   tables_ = LampTables(scene, side, stop);
   if (tables_.view().size == 0 || stop.stop_requested()) return;
-  const Bounds media = filledBounds(scene);
+  const Bounds media = boundsOfMedia(scene);
   const std::vector<Vec3> points = pointsInMedia(view);
   const int endless = endlessMedium(scene);
   const float voxels = mostVoxels(view);
@@ -112,19 +107,20 @@ TabledLamps::TabledLamps(const Scene& scene, int side, const std::stop_token& st
   if (std::none_of(lamps_.begin(), lamps_.end(), [](const TabledLamp& lamp) { return lamp.present(); })) lamps_.clear();
 }
 
-int tabledLampSide(const SceneView& scene, int64_t pixels) {
-  if (scene.chromatic || scene.thinGlass) return 0;
+int tabledLampSide(const Scene& scene, int64_t pixels) {
+  if (scene.view.chromatic || scene.view.thinGlass) return 0;
   size_t voxels = 0;
-  for (const MediumView& medium : scene.media) {
+  for (const MediumView& medium : scene.view.media) {
     const Vec3 size = medium.density.supportHi - medium.density.supportLo;
     voxels += static_cast<size_t>(double{size.x} * double{size.y} * double{size.z});
   }
   // So many nodes take as long as a path or two.
   constexpr size_t kLeastBytes = 16 << 20, kNodesPerPixel = 64;
+  constexpr int kMostNodes = 256;
   const size_t most = std::min(std::max(kLeastBytes, voxels * sizeof(float) * 2 / 5),
                                static_cast<size_t>(pixels) * kNodesPerPixel * sizeof(float));
-  int side = lampTableSide(scene);
-  while (side > LampTables::kLeastSide && lampTableBytes(scene, side) > most) side -= side / 8 + 1;
+  int side = static_cast<int>(std::min(wantedLampTableSide(scene), float{kMostNodes}));
+  while (side > LampTables::kLeastSide && lampTableBytes(scene.view, side) > most) side -= side / 8 + 1;
   return std::max(0, side);
 }
 

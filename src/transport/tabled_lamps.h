@@ -48,8 +48,8 @@ class TabledLamps {
   std::vector<TabledLamp> lamps_;
 };
 
-/// Nodes in either direction that do justice to the scene's grids, but take little memory beside dense ones and little
-/// time beside a picture of so many pixels. 0 where there can be no tables.
-int tabledLampSide(const SceneView& scene, int64_t pixels);
+/// Nodes in either direction that do justice to the scene's grids, as far as they take little memory beside dense ones
+/// and little time beside a picture of so many pixels. 0 where there can be no tables.
+int tabledLampSide(const Scene& scene, int64_t pixels);
 
 }  // namespace virga

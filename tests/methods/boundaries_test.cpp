@@ -76,7 +76,7 @@ Film film(const std::string& elements, uint64_t seed, const std::string& lampTab
 
 bool hasTable(const std::string& elements) {
   const SceneSnapshot scene = sceneOf(elements);
-  const TabledLamps lamps(*scene, tabledLampSide(scene->view, kPixels * kPixels), {});
+  const TabledLamps lamps(*scene, tabledLampSide(*scene, kPixels * kPixels), {});
   return lamps.view().size > 0 && lamps.view()[0].present();
 }
 

@@ -93,7 +93,7 @@ TEST(TabledLamps, WorseTablesAreCheckedMoreOftenAndTheWorstAreNotUsed) {
     const TabledLamps lamps(*scene, side, {});
     return lamps.view().size > 0 && lamps.view()[0].present() ? lamps.view()[0].checks : 1.f;
   };
-  const float usual = checks(tabledLampSide(scene->view, kManyPixels));
+  const float usual = checks(tabledLampSide(*scene, kManyPixels));
   EXPECT_LT(usual, 0.08f);
   EXPECT_GT(checks(24), 1.5f * usual);
   EXPECT_EQ(checks(2), 1) << "no table";
@@ -122,7 +122,7 @@ TEST(TabledLamps, AreNotWhereTheyCannotBe) {
     const SceneSnapshot scene = sceneOf(elements);
     EXPECT_EQ(TabledLamps(*scene, 40, {}).view().size, 0);
     EXPECT_EQ(TabledLamps(*scene, 0, {}).view().size, 0);
-    return tabledLampSide(scene->view, kManyPixels);
+    return tabledLampSide(*scene, kManyPixels);
   };
   EXPECT_EQ(side(fog(8) + point(R"(x="0" y="0" z="0")", 1)), 0);
   EXPECT_EQ(side(replaced(plume(8), R"(<float name="scale" value="12"/>)", R"(<rgb name="scale" value="12, 4, 8"/>)")),
@@ -131,9 +131,9 @@ TEST(TabledLamps, AreNotWhereTheyCannotBe) {
 
 TEST(TabledLamps, AreSmallBesideThePicture) {
   const SceneSnapshot scene = sceneOf(plume(8));
-  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(scene->view, 100)), size_t{100 * 64 * 4});
-  EXPECT_GT(tabledLampSide(scene->view, kManyPixels), 2 * tabledLampSide(scene->view, 100));
-  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(scene->view, kManyPixels)), size_t{16} << 20);
+  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(*scene, 100)), size_t{100 * 64 * 4});
+  EXPECT_GT(tabledLampSide(*scene, kManyPixels), 2 * tabledLampSide(*scene, 100));
+  EXPECT_LE(lampTableBytes(scene->view, tabledLampSide(*scene, kManyPixels)), size_t{16} << 20);
 }
 
 // --- pictures ---

@@ -59,11 +59,12 @@ Errors errorsOf(const Scene& scene, int side) {
   return errors;
 }
 
-void expectTables(const std::string& elements, double limit = 0.015) {
+/// `coarser`: by so much a table is too coarse.
+void expectTables(const std::string& elements, double limit = 0.015, int coarser = 8) {
   const SceneSnapshot scene = sceneOf(elements);
-  const int side = lampTableSide(scene->view);
+  const int side = lampTableSide(*scene);
   ASSERT_GT(side, 0);
-  const Errors fine = errorsOf(*scene, side), coarse = errorsOf(*scene, side / 8);
+  const Errors fine = errorsOf(*scene, side), coarse = errorsOf(*scene, side / coarser);
   ASSERT_LT(fine.darkest, 0.5) << "there is something to be in the shadow of";
   for (int c = 0; c < 3; ++c) {
     EXPECT_LT(fine.rms[c], limit) << c;
@@ -87,6 +88,13 @@ std::string overlapping() {
   const std::string smoke = text.substr(text.find(begin));
   return text + replaced(smoke, R"(<scale value="0.95"/>)", R"(<scale value="0.5"/><translate x="0.2" y="-0.6"/>)");
 }
+/// The plume's smoke once more, beside it.
+std::string twice(double apart) {
+  const std::string text = plume(8), begin = R"(<shape type="cube"><transform name="to_world"><scale value="0.95"/>)",
+                    place = R"(<translate x="-1" y="-1" z="-1"/>)";
+  const std::string smoke = text.substr(text.find(begin)), there = fmt::format(R"(<translate x="{}"/>)", apart);
+  return text + replaced(replaced(smoke, begin, begin + there), place, place + there);
+}
 
 TEST(LampTables, ALampOutsideLooksIntoASquareOfDirections) { expectTables(plume(8)); }
 TEST(LampTables, ALampInTheMediumLooksAllAround) { expectTables(withLampAt(R"(x="0.1" y="-0.4" z="0.05")")); }
@@ -94,6 +102,14 @@ TEST(LampTables, ALampBesideTheMediumLooksAllAround) { expectTables(withLampAt(R
 TEST(LampTables, MediaThatOverlap) { expectTables(overlapping()); }
 // The plume's foot is cut off by the grid.
 TEST(LampTables, AGridLargerThanAllShapes) { expectTables(endlessPlume(8, 4), 0.02); }
+TEST(LampTables, GridsThatLieApart) { expectTables(twice(5), 0.015, 16); }
+// Where they are too small beside what lies between them fast marches, and path checks its tables.
+TEST(LampTables, GridsThatLieFarApart) {
+  const SceneSnapshot scene = sceneOf(twice(20));
+  EXPECT_GT(wantedLampTableSide(*scene), 512);
+  EXPECT_EQ(lampTableSide(*scene), 0);
+  EXPECT_GT(errorsOf(*scene, 72).rms[0], 0.03) << "a table for one of them alone";
+}
 TEST(LampTables, Colours) {
   const std::string scale = R"(<float name="scale" value="12"/>)";
   expectTables(replaced(plume(8), scale, R"(<rgb name="scale" value="12, 4, 8"/>)"));
@@ -107,7 +123,7 @@ TEST(LampTables, WhereTheyCannotBeThereAreNone) {
   for (int i = 0; i < LampTables::kMostLamps; ++i) many += point;
   for (const std::string& elements : {fog(8) + point, replaced(plume(8), lamp, sun + sphere), many}) {
     const SceneSnapshot scene = sceneOf(elements);
-    EXPECT_EQ(lampTableSide(scene->view), 0);
+    EXPECT_EQ(lampTableSide(*scene), 0);
     EXPECT_EQ(LampTables(*scene, 16, {}).view().size, 0);
   }
   const SceneSnapshot mixed = sceneOf(plume(8) + sphere + sun);

@@ -278,7 +278,7 @@ TEST(Layers, PointLightIsASmallSphereInSmoke) {
   world.rectangles.erase(world.rectangles.begin() + 1);
   const std::string elements = elementsOf(world), place = R"(x="-1.1" y="1.4" z="1"/>)";
   const SceneSnapshot scene = sceneOf(elements + pointAt(place));
-  const TabledLamps lamps(*scene, tabledLampSide(scene->view, world.size * world.size), {});
+  const TabledLamps lamps(*scene, tabledLampSide(*scene, world.size * world.size), {});
   ASSERT_TRUE(lamps.view().size > 0 && lamps.view()[0].present());
   const Picture truth = pictureByPath(elements + smallSphereAt(place));
   expectAgreement(pictureByPath(elements + pointAt(place), 2), truth,

@@ -28,15 +28,7 @@ class KeptWalksTest : public ::testing::Test {
  protected:
   /// A room with a lamp, smoke in its middle and, in a corner that overlaps it, coloured fog.
   SceneSnapshot room(const Density& density, const std::string& fog = "0.3, 0.6, 1.2", double albedo = 0.8) {
-    constexpr int kSize = 10;
-    DenseVolume volume{kSize, kSize, kSize, {}, {}};
-    for (int z = 0; z < kSize; ++z)
-      for (int y = 0; y < kSize; ++y)
-        for (int x = 0; x < kSize; ++x)
-          volume.values.push_back(density(
-              (Vec3(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)) + Vec3(0.5f)) / kSize));
-    const std::string name = fmt::format("smoke{}.vol", ++files_);
-    writeVol(folder_ / name, volume);
+    const std::string name = write(density, 10);
     return test::build(
         fmt::format(R"(<shape type="cube"><boolean name="flip_normals" value="true"/><transform name="to_world">
       <scale value="2"/></transform><bsdf type="diffuse"><rgb name="reflectance" value="0.6, 0.5, 0.3"/></bsdf></shape>
@@ -54,7 +46,34 @@ class KeptWalksTest : public ::testing::Test {
         folder_.path().string());
   }
 
+  /// Smoke of 64^3 voxels above a small floor, in a cube or declared by the sensor.
+  SceneSnapshot smokeAlone(const Density& density, bool inCube) {
+    const std::string medium =
+        fmt::format(R"(<medium type="heterogeneous" id="smoke"><volume name="sigma_t" type="gridvolume">
+      <string name="filename" value="{}"/><transform name="to_world"><translate value="-0.5"/><scale value="16"/>
+      </transform></volume></medium><shape type="rectangle"><transform name="to_world"><rotate x="1" angle="-90"/>
+      <translate y="-2"/></transform></shape>)",
+                    write(density, 64));
+    const std::string cube = R"(<shape type="cube"><transform name="to_world"><scale value="8"/></transform>
+      <bsdf type="null"/><ref id="smoke" name="interior"/></shape><sensor type="perspective"/>)";
+    const std::string sensor = R"(<sensor type="perspective"><ref id="smoke" name="medium"/></sensor>)";
+    return buildScene(test::describe(medium + (inCube ? cube : sensor), folder_.path().string()));
+  }
+
  private:
+  std::string write(const Density& density, int size) {
+    DenseVolume volume{size, size, size, {}, {}};
+    for (int z = 0; z < size; ++z)
+      for (int y = 0; y < size; ++y)
+        for (int x = 0; x < size; ++x)
+          volume.values.push_back(
+              density((Vec3(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)) + Vec3(0.5f)) /
+                      static_cast<float>(size)));
+    const std::string name = fmt::format("smoke{}.vol", ++files_);
+    writeVol(folder_.path() / name, volume);
+    return name;
+  }
+
   ScratchFolder folder_;
   int files_ = 0;
 };
@@ -177,6 +196,19 @@ TEST_F(KeptWalksTest, KnowHowMuchTheMediaChange) {
   EXPECT_NEAR(changeTo(room(none)), 1, 1e-4f);
   EXPECT_EQ(changeOfMedia(*room(none), *before), 1);
   EXPECT_EQ(changeTo(room(stripes, "0.3, 0.6, 1.2", 0.5)), 0) << "an albedo is no extinction";
+}
+
+// A small ball in a large grid, as the sensor's medium and in a cube; it moves by its own width.
+TEST_F(KeptWalksTest, KnowHowMuchSmallMediaChange) {
+  const auto ball = [](float x) { return [x](Vec3 p) { return length(p - Vec3(x, 0.5f, 0.5f)) < 0.03f ? 1.f : 0.f; }; };
+  const auto moved = [&](float by, bool inCube) {
+    return changeOfMedia(*smokeAlone(ball(0.25f), inCube), *smokeAlone(ball(0.25f + by), inCube));
+  };
+  for (const bool inCube : {false, true}) {
+    EXPECT_EQ(moved(0, inCube), 0);
+    EXPECT_GT(moved(1 / 16.f, inCube), 0.9f);
+    EXPECT_NEAR(moved(1 / 64.f, inCube), 0.75f, 0.25f);
+  }
 }
 
 bool same(const VirtualLights& a, const VirtualLights& b) {

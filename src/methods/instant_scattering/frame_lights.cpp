@@ -130,10 +130,10 @@ float FrameLights::medianRadius() const {
 }
 
 bool FrameLights::gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const {
-  if (!between_.grey() || !maps_) return false;
+  if (!between_.grey() || !maps_ || between_.parts() > 1) return false;
   const Light& light = lights_[i];
   const bool looksUp = between_.kind() == MediaBetween::Kind::tables;
-  const DepthTable table = looksUp ? between_.table(i, 0) : DepthTable{};
+  const DepthTable table = looksUp ? between_.table(i, 0, 0) : DepthTable{};
   gatherThrough(light.kernel, light.kind, to, kind, looksUp ? &table : nullptr, between_.fog().r, maps_->map(i), near);
   return true;
 }

@@ -58,7 +58,7 @@ class FrameLights {
   /// as the first.
   void lookFrom(size_t i, const KernelReceivers& to, EndKind kind, float* seen[3]) const;
   /// Does all that lookFrom() and gatherLight() would, for a plain light; false, and nothing done, where media are not
-  /// grey or there are no shadow maps.
+  /// grey or lie far apart, or there are no shadow maps.
   bool gatherAtOnce(size_t i, const KernelReceivers& to, EndKind kind, const NearField& near) const;
 
  private:

@@ -191,7 +191,8 @@ ImsOptions ImsSettings::forScene(const Scene& scene) const {
     amount->lights = isFrame ? lights : lights_.value_or(lights);
   if (isFrame) o.frameLights = lights_.value_or(o.frameLights);
   const bool maps = o.visibility.mode == LightVisibilityOptions::Mode::shadowMap;
-  o.lampTable = lampTable_.nodes(scene.view, lampTableSide(scene.view));  // 0: marched light is all that there can be
+  o.lampTable =
+      mayHaveLampTables(scene.view) ? lampTable_.nodes(scene.view, lampTableSide(scene)) : 0;  // 0: it is marched
   o.walks = walks_.value_or(isFrame ? kFrameWalks : maps ? kWalksWithMaps : kWalks);
   const float extent = extentOf(scene.view);
   o.compensation.radius = radius_.value_or(kRadiusShare * extent);

@@ -87,47 +87,68 @@ MediaBetween::MediaBetween(const Scene& scene, std::vector<Vec3> points, const O
     }
   }
   if (kind_ != Kind::tables) return;
-  const Bounds media = boundsOfMedia(scene);
-  if (media.empty()) {
+  boxes_ = boxesOfMedia(scene, mostParts());
+  if (boxes_.empty()) {
     kind_ = Kind::nothing;
     return;
   }
   VIRGA_ASSERT(sizeOfTable() < DepthTable::kMostSize);
-  for (const Vec3 p : points_) views_.push_back(viewOf(media, p));
-  depth_.resize(points_.size() * static_cast<size_t>(channels_) * sizeOfTable());
+  for (const Vec3 p : points_)
+    for (const Bounds& box : boxes_) views_.push_back(viewOf(box, p));
+  depth_.resize(views_.size() * static_cast<size_t>(channels_) * sizeOfTable());
   const int packets = (options_.side * options_.side + EyePacket::kSize - 1) / EyePacket::kSize;
-  parallelFor(static_cast<int64_t>(points_.size()), 1, [&](int64_t i) {
-    const MediaState at = mediaAt(scene, points_[static_cast<size_t>(i)], endlessMedium(scene));
-    parallelFor(packets, 8, [&](int64_t n) {
-      if (!stop.stop_requested()) fill(scene, static_cast<size_t>(i), at, static_cast<size_t>(n) * EyePacket::kSize);
+  parallelFor(static_cast<int64_t>(points_.size()), 1, [&](int64_t n) {
+    const auto i = static_cast<size_t>(n);
+    const MediaState at = mediaAt(scene, points_[i], endlessMedium(scene));
+    parallelFor(packets, 8, [&](int64_t packet) {
+      for (size_t part = 0; part < parts() && !stop.stop_requested(); ++part)
+        fill(scene, i, part, at, static_cast<size_t>(packet) * EyePacket::kSize);
     });
   });
 }
 
-void MediaBetween::fill(const Scene& scene, size_t i, const MediaState& media, size_t first) {
-  const SceneView& view = scene.view;
+size_t MediaBetween::mostParts() const {
+  constexpr size_t kMostBytes = 256 << 20;
+  const size_t one = std::max<size_t>(1, points_.size()) * static_cast<size_t>(channels_) * sizeOfTable();
+  return std::clamp(kMostBytes / (one * sizeof(float)), size_t{1}, static_cast<size_t>(options_.parts));
+}
+
+template <class Visit>
+void MediaBetween::walkPart(const Scene& scene, size_t part, MediaRay& r, float tMax, const Visit& visit) const {
   const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+  ClippedRange within{0, tMax};
+  if (parts() > 1) within = clipToBox(r.ray.o, r.ray.d, boxes_[part].lo, boxes_[part].hi, 0, tMax);
+  if (!(within.t0 < within.t1)) return;
+  walkMedia(scene.view, rays, r, within.t1, [&](float t0, float t1) {
+    const float from = std::max(t0, within.t0);
+    return !(from < t1) || visit(from, t1);
+  });
+}
+
+void MediaBetween::fill(const Scene& scene, size_t i, size_t part, const MediaState& media, size_t first) {
+  const SceneView& view = scene.view;
+  const DepthView& lookAt = views_[i * parts() + part];
   const auto side = static_cast<size_t>(options_.side), radii = static_cast<size_t>(options_.radii);
   const size_t count = std::min<size_t>(EyePacket::kSize, side * side - first);
   const int steps = options_.radii * 4 / 3;
-  const std::vector<float> distances = radiiOf(views_[i], options_.radii);
-  float* const table = &depth_[i * static_cast<size_t>(channels_) * sizeOfTable() + first * radii];
+  const std::vector<float> distances = radiiOf(lookAt, options_.radii);
+  float* const table = &depth_[(i * parts() + part) * static_cast<size_t>(channels_) * sizeOfTable() + first * radii];
   EyePacket packet;
   packet.clear();
   const auto rayOf = [&](size_t n) {
     const auto column = static_cast<int>((first + n) % side), row = static_cast<int>((first + n) / side);
-    return MediaRay{{points_[i], nodeDirection(views_[i], options_.side, column, row)}, media, 0};
+    return MediaRay{{points_[i], nodeDirection(lookAt, options_.side, column, row)}, media, 0};
   };
   for (size_t n = 0; n < count; ++n) {
     MediaRay r = rayOf(n);
     bool alone = false;  // its media are not for the packet
-    walkMedia(view, rays, r, views_[i].last, [&](float t0, float t1) {
+    walkPart(scene, part, r, lookAt.last, [&](float t0, float t1) {
       alone = !r.media.vacuum() && (packet.has(n) || !packet.add(view, n, r.ray, r.media, t0, t1, steps, 0));
       return !alone;
     });
     if (!alone) continue;
     packet.remove(n);
-    fillNode(scene, rayOf(n), distances, table + n * radii);
+    fillNode(scene, part, rayOf(n), distances, table + n * radii);
   }
   packet.march();
   for (size_t n = 0; n < count; ++n)
@@ -138,14 +159,13 @@ void MediaBetween::fill(const Scene& scene, size_t i, const MediaState& media, s
     }
 }
 
-void MediaBetween::fillNode(const Scene& scene, MediaRay r, const std::vector<float>& distances, float* out) const {
-  const SceneView& view = scene.view;
-  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
+void MediaBetween::fillNode(const Scene& scene, size_t part, MediaRay r, const std::vector<float>& distances,
+                            float* out) const {
   const int steps = options_.radii * 4 / 3;
   MarchedDepth way;
   way.clear();
-  walkMedia(view, rays, r, distances.back(), [&](float t0, float t1) {
-    return marchMedia(view, r.media, r.ray, t0, t1, steps, 0, [&](float a, float b, Rgb depth) {
+  walkPart(scene, part, r, distances.back(), [&](float t0, float t1) {
+    return marchMedia(scene.view, r.media, r.ray, t0, t1, steps, 0, [&](float a, float b, Rgb depth) {
       way.add(a, b, depth);
       return true;
     });
@@ -164,7 +184,8 @@ void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) con
       lookThroughFog({p.x, p.y, p.z}, to, fog_[c], seen[c]);
     else
       std::fill_n(seen[c], to.count, 1.f);
-    if (kind_ == Kind::tables) lookThroughTable({p.x, p.y, p.z}, to, table(i, c), seen[c]);
+    for (size_t part = 0; kind_ == Kind::tables && part < parts(); ++part)
+      lookThroughTable({p.x, p.y, p.z}, to, table(i, part, c), seen[c]);
   }
 }
 

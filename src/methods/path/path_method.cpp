@@ -82,7 +82,8 @@ class PathMethod final : public Method {
   /// Throws where tables would be too large.
   int tableSide() const {
     const int64_t pixels = int64_t{scene_->camera.filmWidth} * scene_->camera.filmHeight;
-    return lampTable_.nodes(scene_->view, tabledLampSide(scene_->view, pixels));
+    const int usual = tabledLampSide(*scene_, pixels);
+    return usual == 0 ? 0 : lampTable_.nodes(scene_->view, usual);
   }
 
   SceneSnapshot scene_;
