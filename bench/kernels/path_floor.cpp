@@ -23,7 +23,7 @@ struct PathWork {
 
   PathWork(const BenchScene& from, bool tables) : scene(from.build()) {
     const int64_t pixels = int64_t{scene->camera.width} * scene->camera.height;
-    if (tables) lamps = TabledLamps(*scene, tabledLampSide(scene->view, pixels), {});
+    if (tables) lamps = TabledLamps(*scene, tabledLampSide(*scene, pixels), {});
     options.maxDepth = scene->integrator.maxDepth, options.rrDepth = scene->integrator.rrDepth;
     options.tabled = lamps.view();
     record = recordPaths(*scene, options);
