@@ -3,7 +3,7 @@
 
 #include "core/sampler.h"
 #include "core/warp.h"
-#include "scene/scene_view.h"
+#include "scene/lamp_choice.h"
 
 namespace virga {
 
@@ -52,11 +52,11 @@ struct RandomNumbers {
   VIRGA_HD int onSurface(int) const { return 1; }
   /// Points on the eye ray that each group lights.
   VIRGA_HD int places() const { return 4; }
-  /// The k-th of a group's `count` points.
-  VIRGA_HD ChosenLamp lamp(const SceneView& scene, int, int k, int count) {
-    (void)k;
-    const float choice = sampler.random();
-    return chooseLamp(scene, choice, sampler.random2D(), count);
+  /// The k-th of a group's `count` points, for the light at a place.
+  VIRGA_HD ChosenLamp lamp(const SceneView& scene, int, int, int count, Vec3 at) {
+    if (!scene.hasLamps()) return {};
+    const EmitterChoice chosen = chooseEmitter(scene, at, sampler.random());
+    return {chosen.emitter, chosen.probability * static_cast<float>(count), sampler.random2D()};
   }
 };
 
@@ -88,7 +88,7 @@ struct FixedNumbers {
   VIRGA_HD int groups() const { return lamps.size; }
   VIRGA_HD int onSurface(int group) const { return lamps[group].onSurface; }
   VIRGA_HD int places() const { return placesOfEach; }
-  VIRGA_HD ChosenLamp lamp(const SceneView& scene, int group, int k, int count) const {
+  VIRGA_HD ChosenLamp lamp(const SceneView& scene, int group, int k, int count, Vec3 = {}) const {
     if (const LampGroup& own = lamps[group]; own.lamp != LampGroup::kDrawn) {
       if (isSky(scene.emitters[own.lamp])) return inSky(scene, own.lamp, k, count);
       return {own.lamp, static_cast<float>(count),

@@ -41,7 +41,7 @@ class MarchedLight {
     const int points = lamps == MediaLamps::atInfinity ? kFogPoints * numbers.places() : numbers.places();
     for (int group = 0; group < numbers.groups(); ++group)
       eye.visitPoints(points, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
-        const ChosenLamp lamp = numbers.lamp(scene_, group, k, points);
+        const ChosenLamp lamp = numbers.lamp(scene_, group, k, points, p);
         if (!(lamp.chance > 0)) return;
         const EmitterView& emitter = scene_.emitters[lamp.index];
         if (lamps == MediaLamps::atInfinity && isAimedAt(emitter)) return;
@@ -90,7 +90,7 @@ class MarchedLight {
     const Vec3 wo = -eye.at.ray.d;
     for (int group = 0; group < numbers.groups(); ++group)
       for (int k = 0; k < numbers.onSurface(group); ++k) {
-        const ChosenLamp lamp = numbers.lamp(scene_, group, k, numbers.onSurface(group));
+        const ChosenLamp lamp = numbers.lamp(scene_, group, k, numbers.onSurface(group), point.p);
         if (!(lamp.chance > 0)) return;
         const LightSample light = sampleLamp(scene_, lamp, point.p);
         if (!(light.pdf > 0)) continue;
