@@ -172,7 +172,7 @@ double strength(const EmitterView& e, bool flat) {
       return v * static_cast<double>(e.area) * (flat ? 1 : 0.25);
     case EmitterView::Kind::constant:
     case EmitterView::Kind::environment:
-      return pi * v;  // and not the fluence: half of it is met by directions that scattering draws
+      return pi * v;
     default:
       return v;
   }
@@ -181,6 +181,7 @@ double strength(const EmitterView& e, bool flat) {
 LampStrength fromAfar(const EmitterView& e, const Scene::Parts& parts) {
   LampStrength lamp;
   lamp.infinite = e.infinite();
+  lamp.sky = lamp.infinite && !e.isDelta();
   lamp.center = e.position;
   if (e.kind == EmitterView::Kind::spot) lamp.axis = e.direction, lamp.least = std::cos(e.cutoffAngle);
   if (e.kind != EmitterView::Kind::area) return lamp;

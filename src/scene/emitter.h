@@ -117,6 +117,7 @@ struct EmitterView {
 struct LampStrength {
   float strength = 0;  ///< irradiance of lights at infinity, else radiant intensity; relative to the scene's strongest
   bool infinite = false;  ///< the rest does not matter
+  bool sky = false;       ///< from all around
   Vec3 center;
   float radius = 0;   ///< of a ball around it [unit]
   Vec3 axis;          ///< unit: it shines to this side, or around it...

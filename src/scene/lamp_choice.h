@@ -24,9 +24,12 @@ struct LampShares {
 
   VIRGA_HD static bool usable(const SceneView& scene) { return scene.lamps.size > 1 && scene.lamps.size <= kMost; }
 
-  VIRGA_HD LampShares(const SceneView& scene, Vec3 p) {
+  /// How often a sky is asked whose light is met by scattered directions as well; by itself it has to be asked more.
+  static constexpr float kSkyIsMet = 1, kSkyAlone = 4;
+
+  VIRGA_HD LampShares(const SceneView& scene, Vec3 p, float sky) {
     for (int i = 0; i < scene.lamps.size; ++i) {
-      light[i] = scene.lamps[i].lightAt(p);
+      light[i] = scene.lamps[i].lightAt(p) * (scene.lamps[i].sky ? sky : 1);
       sum += light[i];
       shining += scene.lamps[i].strength > 0;
     }
@@ -42,12 +45,13 @@ struct LampShares {
 };
 
 /// For the light at p. The scene must have lamps.
-VIRGA_HD inline EmitterChoice chooseEmitter(const SceneView& scene, Vec3 p, float u) {
+VIRGA_HD inline EmitterChoice chooseEmitter(const SceneView& scene, Vec3 p, float u,
+                                            float sky = LampShares::kSkyIsMet) {
   if (!LampShares::usable(scene)) {
     const auto choice = scene.emitterChoice.sample(u);
     return {choice.index, choice.probability};
   }
-  const LampShares shares(scene, p);
+  const LampShares shares(scene, p, sky);
   EmitterChoice chosen;
   for (int i = 0; i < scene.lamps.size; ++i) {
     const float share = shares.probability(scene, i);
@@ -59,10 +63,10 @@ VIRGA_HD inline EmitterChoice chooseEmitter(const SceneView& scene, Vec3 p, floa
   return chosen;
 }
 
-/// With which chooseEmitter() takes this one.
+/// With which chooseEmitter() takes this one, whose light is met by scattered directions if it is a sky.
 VIRGA_HD inline float emitterProbability(const SceneView& scene, Vec3 p, int emitter) {
   if (!LampShares::usable(scene)) return scene.emitterChoice.probability(emitter);
-  return LampShares(scene, p).probability(scene, emitter);
+  return LampShares(scene, p, LampShares::kSkyIsMet).probability(scene, emitter);
 }
 
 }  // namespace virga

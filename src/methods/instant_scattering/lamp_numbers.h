@@ -55,7 +55,7 @@ struct RandomNumbers {
   /// The k-th of a group's `count` points, for the light at a place.
   VIRGA_HD ChosenLamp lamp(const SceneView& scene, int, int, int count, Vec3 at) {
     if (!scene.hasLamps()) return {};
-    const EmitterChoice chosen = chooseEmitter(scene, at, sampler.random());
+    const EmitterChoice chosen = chooseEmitter(scene, at, sampler.random(), LampShares::kSkyAlone);
     return {chosen.emitter, chosen.probability * static_cast<float>(count), sampler.random2D()};
   }
 };
