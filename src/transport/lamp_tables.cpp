@@ -12,8 +12,8 @@ namespace {
 /// A wider square of directions would waste its corners: all around is better.
 constexpr float kMostReach = 1.5f;
 
-/// Of tables, in either direction.
-constexpr int kFewNodes = 32, kManyNodes = 256;
+/// Of a table, in either direction.
+constexpr int kFewNodes = 32, kManyNodes = LampTables::kMostByDefault;
 
 bool isPointLike(const EmitterView& e) {
   return e.kind == EmitterView::Kind::point || e.kind == EmitterView::Kind::spot;
@@ -118,10 +118,10 @@ float wantedLampTableSide(const Scene& scene) {
 }
 
 int lampTableSide(const Scene& scene) {
-  constexpr size_t kMostByDefault = 128 << 20;
+  constexpr size_t kMostBytes = 128 << 20;
   const float wanted = wantedLampTableSide(scene);
   int side = static_cast<int>(std::min(wanted, float{kManyNodes}));
-  while (side > kFewNodes && lampTableBytes(scene.view, side) > kMostByDefault) side /= 2;
+  while (side > kFewNodes && lampTableBytes(scene.view, side) > kMostBytes) side /= 2;
   return 2 * static_cast<float>(side) >= wanted ? side : 0;
 }
 

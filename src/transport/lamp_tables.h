@@ -80,7 +80,7 @@ struct LampTable {
 class LampTables {
  public:
   static constexpr int kMostLamps = 8;  ///< where there are more, marching costs less than filling their tables
-  static constexpr int kLeastSide = 2, kMostSide = 512;
+  static constexpr int kLeastSide = 2, kMostSide = 512, kMostByDefault = 256;
   static constexpr size_t kMostBytes = size_t{1} << 30;
 
   LampTables() = default;

@@ -116,10 +116,9 @@ int tabledLampSide(const Scene& scene, int64_t pixels) {
   }
   // So many nodes take as long as a path or two.
   constexpr size_t kLeastBytes = 16 << 20, kNodesPerPixel = 64;
-  constexpr int kMostNodes = 256;
   const size_t most = std::min(std::max(kLeastBytes, voxels * sizeof(float) * 2 / 5),
                                static_cast<size_t>(pixels) * kNodesPerPixel * sizeof(float));
-  int side = static_cast<int>(std::min(wantedLampTableSide(scene), float{kMostNodes}));
+  int side = static_cast<int>(std::min(wantedLampTableSide(scene), float{LampTables::kMostByDefault}));
   while (side > LampTables::kLeastSide && lampTableBytes(scene.view, side) > most) side -= side / 8 + 1;
   return std::max(0, side);
 }

@@ -83,6 +83,8 @@ class ImsEyePaths {
   VIRGA_HD LayerRadiance traceGlow(const CameraRay& camera, Sampler& sampler) const {
     return glowTracer_.trace(camera, sampler);
   }
+  /// Is there light that traceCaustics() would find?
+  VIRGA_HD bool anyCaustics() const { return caustics_; }
   /// Likewise light that x1 gets from lamps by way of mirrors and glass alone: where lamps are marched to, that is not
   /// looked for.
   VIRGA_HD LayerRadiance traceCaustics(const CameraRay& camera, Sampler& sampler) const {

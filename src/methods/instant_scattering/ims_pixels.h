@@ -45,6 +45,7 @@ class ImsPixels {
   }
   /// Light that x1 gets from lamps by way of mirrors and glass alone, as ImsEyePaths::traceCaustics().
   LayerRadiance sampleCaustics(int x, int y, const SampleId& id) const {
+    if (!paths_.anyCaustics()) return {};
     Sampler sampler(id);
     const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
     return paths_.traceCaustics(camera, sampler);
