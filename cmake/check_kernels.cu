@@ -126,7 +126,7 @@ __global__ void marchPackets(KernelGrid grid, KernelEyes* eyes, KernelDepths* de
                              const float* places, float* out) {
   const auto n = threadIdx.x;
   kernels::march(grid, eyes[n], depths[n]);
-  kernels::pointsAt(eyes[n], depths[n], 0.5f, points[n]);
+  kernels::pointsAt(eyes[n], depths[n], places, points[n]);
   kernels::depthsAlong(eyes[n], depths[n], 0, places, 1, out + 32 * n);
   kernels::lampAtPoints(lamp, eyes[n], points[n], 0.6f, out + 32 * n + 1);
 }

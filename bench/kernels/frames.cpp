@@ -39,7 +39,10 @@ struct Work {
   }
 
  private:
-  void march(int x, int y) { marchMiddle(scene_, x, y, 128, *eye_); }
+  void march(int x, int y) {
+    const EyeStart start = middleOf(scene_, x, y);
+    marchEye(scene_.view, EmbreeRays{*scene_.surfaceRays, *scene_.boundaryRays}, start.camera, start.shift, *eye_);
+  }
   void light(const std::vector<Upsampling::Pixel>& pixels) {
     constexpr int kPoints = 4;
     for (const auto [x, y] : pixels) {

@@ -190,7 +190,10 @@ TEST(PixelFeatures, OfFogBeforeAWall) {
       <bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.25, 0"/></bsdf></shape>
     <shape type="cube"><bsdf type="null"/><medium name="interior" type="homogeneous"><float name="sigma_t" value="0.35"/>
       </medium></shape>)");
-  const PixelFeatures f = pixelFeatures(*scene, 1, 1);
+  const EyeStart start = middleOf(*scene, 1, 1);
+  MarchedEye eye;
+  marchEye(scene->view, EmbreeRays{*scene->surfaceRays, *scene->boundaryRays}, start.camera, start.shift, eye);
+  const PixelFeatures f = pixelFeatures(eye);
   const float transmittance = std::exp(-0.7f);
   EXPECT_TRUE(f.regular);
   EXPECT_NEAR(f.depth, 7, 0.02f);

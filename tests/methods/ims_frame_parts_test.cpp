@@ -165,8 +165,8 @@ TEST(EyePacket, MarchesAsEachRayByItself) {
   media.at(0).spectrum = {1, 0.5f, 0.2f};
   view.media = {media.data(), view.media.size};
   const EmbreeRays rays{*scene->surfaceRays, *scene->boundaryRays};
-  constexpr float kShift = 0.3f;
   constexpr int kPoints = 4;
+  const auto shiftOf = [](size_t i) { return 0.06f * static_cast<float>(i); };
   EyePacket packet;
   packet.clear();
   std::vector<MarchedEye> eyes(EyePacket::kSize);
@@ -174,24 +174,27 @@ TEST(EyePacket, MarchesAsEachRayByItself) {
     const float u = static_cast<float>(i % 4), v = static_cast<float>(i / 4);
     const CameraRay camera{{{i == 7 ? 3 : 0.3f * u - 0.6f, 0.4f * v - 0.7f, 5}, normalize(Vec3(0.05f, 0.02f, -1))}, 9};
     MarchedEye beside;
-    walkEye(view, rays, camera, rays.nearest(camera.ray, camera.tMax), beside,
-            [&](float t0, float t1) { return packet.add(view, i, camera.ray, beside.at.media, t0, t1, 100, kShift); });
-    marchEye(view, rays, camera, kShift, eyes[i], 100);
+    walkEye(view, rays, camera, rays.nearest(camera.ray, camera.tMax), beside, [&](float t0, float t1) {
+      return packet.add(view, i, camera.ray, beside.at.media, t0, t1, 100, shiftOf(i));
+    });
+    marchEye(view, rays, camera, shiftOf(i), eyes[i], 100);
     EXPECT_EQ(packet.has(i), i != 7);
   }
   packet.march();
   int dense = 0;
   std::vector<EyePoints> points(kPoints);
-  for (int k = 0; k < kPoints; ++k)
-    placePoints(packet.eyes(), packet.depths(), (static_cast<float>(k) + 0.4f) / kPoints,
-                points[static_cast<size_t>(k)]);
+  for (int k = 0; k < kPoints; ++k) {
+    alignas(64) float place[EyePacket::kSize];
+    for (size_t i = 0; i < eyes.size(); ++i) place[i] = (static_cast<float>(k) + shiftOf(i)) / kPoints;
+    placePoints(packet.eyes(), packet.depths(), place, points[static_cast<size_t>(k)]);
+  }
   for (size_t i = 0; i < eyes.size(); ++i) {
     for (int c = 0; packet.has(i) && c < 3; ++c)
       EXPECT_NEAR(packet.depth(i)[c], eyes[i].depth[c], 1e-4f * eyes[i].depth[c] + 1e-6f);
     if (!(eyes[i].opacity() > 0.01f)) continue;
     ++dense;
     EXPECT_NEAR(packet.meanPlace(i), pixelFeatures(eyes[i]).mediaDepth, 1e-3f);
-    eyes[i].visitPoints(kPoints, 0.4f, [&](int k, Vec3 p, Rgb weight, const MediaState&) {
+    eyes[i].visitPoints(kPoints, shiftOf(i), [&](int k, Vec3 p, Rgb weight, const MediaState&) {
       const EyePoints& at = points[static_cast<size_t>(k)];
       EXPECT_LT(length(Vec3(at.px[i], at.py[i], at.pz[i]) - p), 2e-3f);
       for (int c = 0; c < 3; ++c) EXPECT_NEAR(at.weight[c][i], weight[c], 1e-3f * weight[c]);

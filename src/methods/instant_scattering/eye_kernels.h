@@ -25,9 +25,9 @@ struct KernelEyes {
   alignas(64) Lanes ox, oy, oz, dx, dy, dz;   ///< the rays in the world
   alignas(64) Lanes gx, gy, gz, hx, hy, hz;   ///< middle of step 0 and one step, in voxels of the grid
   alignas(64) Lanes begin, end, step;         ///< along the ray [unit]
+  alignas(64) Lanes shift;                    ///< in [0, 1)
   alignas(64) int first[kSize], last[kSize];  ///< the steps that may hold something; none where first > last
   int from = 0, to = -1;                      ///< of all rays
-  float shift = 0;                            ///< in [0, 1)
   float sigmaT = 0;                           ///< of density 1 in the densest channel [1/unit]
   float spectrum[3] = {1, 1, 1};              ///< of the channels, relative to it
   float thick = 0;                            ///< optical depth in that channel behind which nothing counts
@@ -90,9 +90,10 @@ VIRGA_HD static inline void march(const KernelGrid& grid, KernelEyes& e, KernelD
     float* __restrict before = d.before[n];
     int marching = 0;
     densitiesAt(grid, e, static_cast<float>(n), density);
-    const float near = std::fmax(static_cast<float>(n) - e.shift, 0.f), far = static_cast<float>(n + 1) - e.shift;
 #pragma omp simd reduction(+ : marching)
     for (int i = 0; i < kSize; ++i) {
+      const float near = std::fmax(static_cast<float>(n) - e.shift[i], 0.f);
+      const float far = static_cast<float>(n + 1) - e.shift[i];
       const float a = e.begin[i] + e.step[i] * near, b = std::fmin(e.begin[i] + e.step[i] * far, e.end[i]);
       const bool within = (n >= e.first[i]) & (n <= e.last[i]) & (d.total[i] <= e.thick);
       const float own = within ? e.sigmaT * density[i] * std::fmax(b - a, 0.f) : 0.f;
@@ -115,16 +116,15 @@ VIRGA_HD static inline void march(const KernelGrid& grid, KernelEyes& e, KernelD
   }
 }
 
-/// Points at the share `place` in [0, 1) of what is seen of the medium, the same for all rays: as
-/// MarchedEye::visitPoints().
-VIRGA_HD static inline void pointsAt(const KernelEyes& e, const KernelDepths& d, float place,
+/// Points at the share `place` in [0, 1) of what is seen of the medium, one for each ray: as MarchedEye::visitPoints().
+VIRGA_HD static inline void pointsAt(const KernelEyes& e, const KernelDepths& d, const float* __restrict place,
                                      EyePoints& __restrict at) {
   constexpr int kSize = KernelEyes::kSize;
   const float mean = meanOf(e.spectrum);
   alignas(64) float reached[kSize];
   alignas(64) int index[kSize];
 #pragma omp simd
-  for (int i = 0; i < kSize; ++i) reached[i] = -std::log(1 - d.opacity[i] * place) / mean, index[i] = e.from;
+  for (int i = 0; i < kSize; ++i) reached[i] = -std::log(1 - d.opacity[i] * place[i]) / mean, index[i] = e.from;
   for (int n = e.from; n < e.to; ++n) {
     const float* __restrict after = d.before[n + 1];
 #pragma omp simd
@@ -135,8 +135,8 @@ VIRGA_HD static inline void pointsAt(const KernelEyes& e, const KernelDepths& d,
     const int n = index[i];
     const float before = d.before[n][i], own = d.before[n + 1][i] - before;
     const float here = clamped((reached[i] - before) / (own + 1e-20f), 1);
-    const float a = e.begin[i] + e.step[i] * std::fmax(static_cast<float>(n) - e.shift, 0.f);
-    const float b = std::fmin(e.begin[i] + e.step[i] * (static_cast<float>(n + 1) - e.shift), e.end[i]);
+    const float a = e.begin[i] + e.step[i] * std::fmax(static_cast<float>(n) - e.shift[i], 0.f);
+    const float b = std::fmin(e.begin[i] + e.step[i] * (static_cast<float>(n + 1) - e.shift[i]), e.end[i]);
     const float t = a + (b - a) * here, depth = before + own * here;
     at.px[i] = e.ox[i] + e.dx[i] * t, at.py[i] = e.oy[i] + e.dy[i] * t, at.pz[i] = e.oz[i] + e.dz[i] * t;
     // The density is that of the mean channel.
@@ -183,7 +183,7 @@ VIRGA_HD static inline void lampAtPoints(const LampPoint& lamp, const KernelEyes
 /// kernels::march.
 void marchEyes(const KernelGrid& grid, KernelEyes& eyes, KernelDepths& depths);
 /// kernels::pointsAt.
-void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place, EyePoints& at);
+void placePoints(const KernelEyes& eyes, const KernelDepths& depths, const float* place, EyePoints& at);
 /// kernels::depthsAlong.
 void lookUpDepths(const KernelEyes& eyes, const KernelDepths& depths, int lane, const float* places, int count,
                   float* out);

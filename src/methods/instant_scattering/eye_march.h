@@ -6,6 +6,12 @@
 
 namespace virga {
 
+/// Where an eye ray starts, and by how much of a step the steps along it are shifted, in [0, 1).
+struct EyeStart {
+  CameraRay camera;
+  float shift;
+};
+
 /// An eye ray: the media that it passes, by marching, and the surface that it meets.
 struct MarchedEye {
   static constexpr int kSteps = 128;  ///< through each stretch of media

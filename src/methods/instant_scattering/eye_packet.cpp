@@ -29,7 +29,6 @@ bool EyePacket::add(const SceneView& scene, size_t lane, const Ray& ray, const M
   if (medium_ ? medium_ != &medium : !isPlainSmoke(medium)) return false;
   medium_ = &medium;
   taken_ |= 1u << lane;
-  eyes_.shift = shift;
   const GridRay inGrid(medium, ray);
   const GridView& grid = medium.density;
   const ClippedRange in = clipToBox(inGrid.o, inGrid.d, grid.supportLo, grid.supportHi, t0, t1);
@@ -45,6 +44,7 @@ bool EyePacket::add(const SceneView& scene, size_t lane, const Ray& ray, const M
   eyes_.dx[lane] = ray.d.x, eyes_.dy[lane] = ray.d.y, eyes_.dz[lane] = ray.d.z;
   eyes_.gx[lane] = middle.x, eyes_.gy[lane] = middle.y, eyes_.gz[lane] = middle.z;
   eyes_.hx[lane] = along.x, eyes_.hy[lane] = along.y, eyes_.hz[lane] = along.z;
+  eyes_.shift[lane] = shift;
   eyes_.begin[lane] = in.t0, eyes_.end[lane] = in.t1, eyes_.step[lane] = step;
   eyes_.first[lane] = first, eyes_.last[lane] = last;
   eyes_.from = std::min(eyes_.from, first), eyes_.to = std::max(eyes_.to, last);

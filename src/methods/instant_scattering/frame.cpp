@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include "core/parallel.h"
 
 namespace virga {
@@ -13,19 +11,6 @@ constexpr int kGroup = 64;
 
 /// Radius of clamping, over that of the balls: what is clamped by a larger one takes more than a level to find again.
 constexpr float kClampedShare = 0.7f;
-
-/// body(x0, y0, x1, y1) for all blocks of FramePixels::Block::kSize pixels, on all threads.
-template <class Body>
-void forEachBlock(const PassFrame& frame, const std::stop_token& stop, const Body& body) {
-  constexpr int kEdge = 4;
-  static_assert(kEdge * kEdge == FramePixels::Block::kSize);
-  const int across = (frame.width() + kEdge - 1) / kEdge, down = (frame.height() + kEdge - 1) / kEdge;
-  parallelFor(down, 1, [&](int64_t row) {
-    const int y = static_cast<int>(row) * kEdge;
-    for (int i = 0; i < across && !stop.stop_requested(); ++i)
-      body(i * kEdge, y, std::min((i + 1) * kEdge, frame.width()), std::min(y + kEdge, frame.height()));
-  });
-}
 
 /// One pass with its lights.
 class FramePass {
@@ -59,22 +44,18 @@ class FramePass {
   void lightDirectly(const std::stop_token& stop, std::span<PixelFeatures> features, PassFrame& frame) {
     // Panes are looked through by paths alone, and paths of one segment see lamps alone.
     const bool marches = !scene_.view.thinGlass && (options_.path.maxDepth < 0 || options_.path.maxDepth >= 2);
-    tbb::enumerable_thread_specific<FramePixels::Block> blocks;
-    forEachBlock(frame, stop, [&](int x0, int y0, int x1, int y1) {
-      FramePixels::Block& block = blocks.local();
-      block.count = 0;
-      for (int y = y0; y < y1; ++y)
-        for (int x = x0; x < x1; ++x) block.pixels[block.count++] = {x, y};
+    forEachBlock(frame, stop, [&](EyeBlock& block) {
       pixels_.direct(block);
       for (size_t i = 0; i < block.count; ++i) {
         const auto [x, y] = block.pixels[i];
-        features[numberOf(x, y)] = block.features[i];
-        if (!block.eyes[i].plain || !marches)
-          block.radiance[i] = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
+        LayerRadiance& radiance = block.radiance[i];
+        features[numberOf(x, y)] = block.features(i);
+        if (!block.eyes()[i].plain || !marches)
+          radiance = paths_.sample(x, y, idOf(x, y), ImsPixels::Part::direct);
         else
-          block.radiance[i] += paths_.sampleCaustics(x, y, idOf(x, y));
-        if (scene_.view.emissive) block.radiance[i] += paths_.sampleGlow(x, y, idOf(x, y));
-        frame.set(x, y, block.radiance[i]);
+          radiance += paths_.sampleCaustics(x, y, idOf(x, y));
+        if (scene_.view.emissive) radiance += paths_.sampleGlow(x, y, idOf(x, y));
+        frame.set(x, y, radiance);
       }
     });
   }

@@ -112,7 +112,7 @@ void lightFog(const LampPoint& lamp, const FogRays& fog, float place, float scal
 
 void marchEyes(const KernelGrid& grid, KernelEyes& eyes, KernelDepths& depths) { kernels::march(grid, eyes, depths); }
 
-void placePoints(const KernelEyes& eyes, const KernelDepths& depths, float place, EyePoints& at) {
+void placePoints(const KernelEyes& eyes, const KernelDepths& depths, const float* place, EyePoints& at) {
   kernels::pointsAt(eyes, depths, place, at);
 }
 

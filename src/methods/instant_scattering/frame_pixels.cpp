@@ -7,42 +7,13 @@ CameraRay FramePixels::cameraRay(int x, int y) const {
   return scene_.camera.ray(static_cast<float>(x) + 0.5f + offset_.x, static_cast<float>(y) + 0.5f + offset_.y);
 }
 
-void FramePixels::direct(Block& block) const {
-  CameraRay cameras[Block::kSize];
-  RayPacket packet;
-  for (size_t i = 0; i < block.count; ++i) {
-    cameras[i] = cameraRay(block.pixels[i].x, block.pixels[i].y);
-    packet.set(static_cast<int>(i), cameras[i].ray, cameras[i].tMax);
-  }
-  const PacketHits hits = rays_.surfaces.nearest(packet);
-  block.smoke.clear();
-  for (size_t i = 0; i < block.count; ++i) meet(block, i, cameras[i], hits[i]);
-  block.smoke.march();
-  for (size_t i = 0; i < block.count; ++i) {
-    MarchedEye& eye = block.eyes[i];
-    const bool packed = block.smoke.has(i);
-    if (packed) eye.depth = block.smoke.depth(i);
-    block.features[i] = packed ? pixelFeatures(eye, block.smoke.meanPlace(i)) : pixelFeatures(eye);
-    block.radiance[i] = {};
-  }
-  packets_.add(std::span(block.eyes).first(block.count), block.smoke, std::span(block.radiance).first(block.count));
-}
-
-void FramePixels::meet(Block& block, size_t i, const CameraRay& camera, const RayHit& hit) const {
-  MarchedEye& eye = block.eyes[i];
-  bool more = false;
-  walkEye(scene_.view, rays_, camera, hit, eye, [&](float t0, float t1) {
-    more = block.smoke.has(i);
-    if (more) return false;
-    if (eye.steps == 0 && packets_.lightSmoke() &&
-        block.smoke.add(scene_.view, i, eye.at.ray, eye.at.media, t0, t1, options_.eyeSteps, numbers_.shift())) {
-      return true;
-    }
-    return marchStretch(scene_.view, eye, t0, t1, numbers_.shift(), options_.eyeSteps);
+void FramePixels::direct(EyeBlock& block) const {
+  block.look(scene_.view, rays_, options_.eyeSteps, packets_.lightSmoke(), [&](EyeBlock::Pixel p) {
+    return EyeStart{cameraRay(p.x, p.y), numbers_.shift()};
   });
-  if (!more) return;
-  block.smoke.remove(i);
-  marchEye(scene_.view, rays_, camera, hit, numbers_.shift(), eye, options_.eyeSteps);
+  const std::span radiance = std::span(block.radiance).first(block.count);
+  std::fill(radiance.begin(), radiance.end(), LayerRadiance());
+  packets_.add(block.eyes(), block.smoke(), radiance);
 }
 
 template <class Visit>

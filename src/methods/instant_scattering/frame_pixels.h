@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include "methods/instant_scattering/eye_block.h"
 #include "methods/instant_scattering/ims_options.h"
 #include "methods/instant_scattering/lamp_packets.h"
 #include "methods/instant_scattering/receivers.h"
@@ -29,27 +30,14 @@ class FramePixels {
 
   using Pixel = Upsampling::Pixel;
 
-  /// Neighbouring pixels that are lit at once.
-  struct Block {
-    static constexpr int kSize = LampPackets::kSize;
-
-    std::array<Pixel, kSize> pixels;
-    size_t count = 0;
-    std::vector<MarchedEye> eyes = std::vector<MarchedEye>(kSize);  ///< room for them
-    std::array<PixelFeatures, kSize> features;                      ///< what is seen
-    EyePacket smoke;                                                ///< what of them goes side by side
-    std::array<LayerRadiance, kSize> radiance;                      ///< light of x1 straight from lamps
-  };
-  /// Fills eyes, features and radiance. No light is found where an eye is not plain: where a mirror, glass or a narrow
-  /// bsdf is seen.
-  void direct(Block& block) const;
+  /// Looks along a block's eye rays, and finds the light of x1 straight from lamps. None is found where an eye is not
+  /// plain: where a mirror, glass or a narrow bsdf is seen.
+  void direct(EyeBlock& block) const;
 
   /// Light that the virtual lights send by way of each pixel's x1; nothing where an eye is not plain.
   std::vector<std::optional<Upsampling::Light>> indirect(std::span<const Pixel> pixels) const;
 
  private:
-  /// Fills eye number i of a block, or leaves its media to the block's packet.
-  void meet(Block& block, size_t i, const CameraRay& camera, const RayHit& hit) const;
   /// The points of a pixel's eye ray that are lit.
   template <class Visit>
   void visitReceivers(const MarchedEye& eye, Visit&& visit) const;

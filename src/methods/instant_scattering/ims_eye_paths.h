@@ -54,10 +54,6 @@ class ImsEyePaths {
 
   /// Radiance along a camera ray, layer by layer [W/(m^2 sr)].
   VIRGA_HD LayerRadiance trace(const CameraRay& camera, Sampler& sampler, Part part = Part::all) const {
-    if (LayerRadiance marched; part == Part::direct && marches_ && march(camera, marched, sampler)) {
-      marched += traceCaustics(camera, sampler);
-      return marched;
-    }
     Path path = tracer_.start(camera);
     Record record;
     path.record = &record;
@@ -100,13 +96,8 @@ class ImsEyePaths {
   }
   /// Is the light of x1 alone found by marching?
   VIRGA_HD bool marches() const { return marches_; }
-  /// That light, of an eye that is plain.
-  VIRGA_HD LayerRadiance light(const MarchedEye& eye, Sampler& sampler) const {
-    LayerRadiance radiance;
-    RandomNumbers numbers{sampler};
-    marched_.add(eye, radiance, numbers);
-    return radiance;
-  }
+  /// That light, of eyes that are plain.
+  VIRGA_HD const MarchedLight<Rays>& marched() const { return marched_; }
 
  private:
   using Tracer = PathTracer<Rays>;
@@ -118,14 +109,6 @@ class ImsEyePaths {
     return path;
   }
 
-  /// False, and nothing added, where the ray meets a mirror, glass or a narrow bsdf first.
-  VIRGA_HD bool march(const CameraRay& camera, LayerRadiance& radiance, Sampler& sampler) const {
-    RandomNumbers numbers{sampler};
-    MarchedEye eye;
-    marchEye(scene_, rays_, camera, numbers.shift(), eye, options_.eyeSteps);
-    if (eye.plain) marched_.add(eye, radiance, numbers);
-    return eye.plain;
-  }
   VIRGA_HD void lightVertex(const Record& at, int events, Path& path, Sampler& sampler) const {
     KnownSpace known;
     if (options_.show != ImsOptions::Show::compensation)

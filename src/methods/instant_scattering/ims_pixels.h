@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "methods/instant_scattering/eye_block.h"
 #include "methods/instant_scattering/ims_eye_paths.h"
-#include "methods/instant_scattering/pixel_features.h"
 #include "methods/pixels.h"
 
 namespace virga {
@@ -28,21 +28,11 @@ class ImsPixels {
     const CameraRay camera = sampleCameraRay(scene_, x, y, sampler);
     return paths_.trace(camera, sampler, part);
   }
-  /// Is the light of x1 alone found by marching?
+  /// Is the light of x1 alone found by marching, as by light()?
   bool marches() const { return paths_.marches(); }
-  /// What pixel (x, y) shows, by the ray through its middle.
-  PixelFeatures features(int x, int y) const { return pixelFeatures(scene_, x, y, options_.eyeSteps); }
-  /// Likewise, and the light of x1 alone, by the same ray unless it sees a mirror or glass. Only where marches().
-  LayerRadiance sampleMiddle(int x, int y, const SampleId& id, PixelFeatures& features) const {
-    MarchedEye eye;
-    marchMiddle(scene_, x, y, options_.eyeSteps, eye);
-    features = pixelFeatures(eye);
-    if (!eye.plain) return sample(x, y, id, Part::direct);
-    Sampler sampler(id);
-    LayerRadiance radiance = paths_.light(eye, sampler);
-    radiance += sampleCaustics(x, y, id);
-    return radiance;
-  }
+  /// The light of x1 straight from lamps in a block's pixels, each with its own random numbers; nothing where an eye is
+  /// not plain.
+  void light(EyeBlock& block, std::span<Sampler> samplers) const;
   /// Light that x1 gets from lamps by way of mirrors and glass alone, as ImsEyePaths::traceCaustics().
   LayerRadiance sampleCaustics(int x, int y, const SampleId& id) const {
     if (!paths_.anyCaustics()) return {};
@@ -60,6 +50,9 @@ class ImsPixels {
   }
 
  private:
+  /// In smoke that the block has marched side by side.
+  void lightSmoke(EyeBlock& block, std::span<Sampler> samplers) const;
+
   static constexpr uint64_t kGlowSeed = 0x2f8b4a91d6e05c37ull;  // keeps its random numbers apart
 
   const Scene& scene_;

@@ -44,6 +44,8 @@ VIRGA_HD inline bool isSky(const EmitterView& e) { return e.infinite() && !e.isD
 
 /// Drawn anew in each sample (`fast`): one group, of any lamps.
 struct RandomNumbers {
+  static constexpr int kPlaces = 4;
+
   Sampler& sampler;
 
   VIRGA_HD float shift() { return sampler.random(); }
@@ -51,7 +53,7 @@ struct RandomNumbers {
   /// Points of a group that light a surface.
   VIRGA_HD int onSurface(int) const { return 1; }
   /// Points on the eye ray that each group lights.
-  VIRGA_HD int places() const { return 4; }
+  VIRGA_HD int places() const { return kPlaces; }
   /// The k-th of a group's `count` points, for the light at a place.
   VIRGA_HD ChosenLamp lamp(const SceneView& scene, int, int, int count, Vec3 at) {
     if (!scene.hasLamps()) return {};

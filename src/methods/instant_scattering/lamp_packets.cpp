@@ -173,7 +173,9 @@ void LampPackets::lightSmoke(std::span<const MarchedEye> eyes, const EyePacket& 
   const int places = lamps_.places();
   for (int n = 0; n < places; ++n) {
     EyePoints at;
-    placePoints(e, smoke.depths(), along(n, places), at);
+    alignas(64) Lanes place;
+    std::fill_n(place, kSize, along(n, places));
+    placePoints(e, smoke.depths(), place, at);
     lamps_.visitTurns(n, places, [&](const FrameLamps::Turn& turn) {
       const LampPoint& lamp = lamps_.points()[static_cast<size_t>(turn.point)];
       alignas(64) Lanes value;

@@ -25,6 +25,11 @@ class MarchedLight {
   template <class Numbers>
   VIRGA_HD void add(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     lightMedia(eye, MediaLamps::all, radiance, numbers);
+    addBesideMedia(eye, radiance, numbers);
+  }
+  /// Likewise what the media scatter left out.
+  template <class Numbers>
+  VIRGA_HD void addBesideMedia(const MarchedEye& eye, LayerRadiance& radiance, Numbers& numbers) const {
     addEmission(eye, radiance);
     lightSurface(eye, radiance, numbers);
   }
@@ -43,12 +48,17 @@ class MarchedLight {
       eye.visitPoints(points, shift, [&](int k, Vec3 p, Rgb weight, const MediaState& media) {
         const ChosenLamp lamp = numbers.lamp(scene_, group, k, points, p);
         if (!(lamp.chance > 0)) return;
-        const EmitterView& emitter = scene_.emitters[lamp.index];
-        if (lamps == MediaLamps::atInfinity && isAimedAt(emitter)) return;
-        const LightSample light = sampleLamp(scene_, lamp, p);
-        const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, lamp.index, light, numbers);
-        radiance.add(Layer::directMedia, found * (1 / lamp.chance));
+        if (lamps == MediaLamps::atInfinity && isAimedAt(scene_.emitters[lamp.index])) return;
+        lightPoint(eye, lamp, p, weight, media, radiance, numbers);
       });
+  }
+  /// By a chosen lamp, at a point of the media; `weight`: as MarchedEye::visitPoints().
+  template <class Numbers>
+  VIRGA_HD void lightPoint(const MarchedEye& eye, const ChosenLamp& lamp, Vec3 p, Rgb weight, const MediaState& media,
+                           LayerRadiance& radiance, Numbers& numbers) const {
+    const LightSample light = sampleLamp(scene_, lamp, p);
+    const Rgb found = weight * lampAt(p, -eye.at.ray.d, media, lamp.index, light, numbers);
+    radiance.add(Layer::directMedia, found * (1 / lamp.chance));
   }
   /// Light that the media scatter from wi toward wo at a point, over their sigma_t [1/sr].
   VIRGA_HD Rgb scatteringAt(Vec3 p, Vec3 wo, Vec3 wi, const MediaState& media) const {

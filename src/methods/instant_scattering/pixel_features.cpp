@@ -5,17 +5,9 @@
 
 namespace virga {
 
-void marchMiddle(const Scene& scene, int x, int y, int steps, MarchedEye& eye) {
-  const EmbreeRays rays{*scene.surfaceRays, *scene.boundaryRays};
-  const float shift = toUnitFloat(hash32(scene.camera.pixelStream(x, y)));
-  const CameraRay camera = scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
-  marchEye(scene.view, rays, camera, shift, eye, steps);
-}
-
-PixelFeatures pixelFeatures(const Scene& scene, int x, int y, int steps) {
-  MarchedEye eye;
-  marchMiddle(scene, x, y, steps, eye);
-  return pixelFeatures(eye);
+EyeStart middleOf(const Scene& scene, int x, int y) {
+  return {scene.camera.ray(static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f),
+          toUnitFloat(hash32(scene.camera.pixelStream(x, y)))};
 }
 
 }  // namespace virga

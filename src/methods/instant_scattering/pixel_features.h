@@ -63,10 +63,8 @@ VIRGA_HD inline PixelFeatures pixelFeatures(const MarchedEye& eye, float mediaDe
 }
 VIRGA_HD inline PixelFeatures pixelFeatures(const MarchedEye& eye) { return pixelFeatures(eye, meanMediaDepth(eye)); }
 
-/// Marches the ray through the middle of pixel (x, y). Nothing is random; the steps of neighbours are shifted against
-/// each other, so that what they miss does not add up to a pattern.
-void marchMiddle(const Scene& scene, int x, int y, int steps, MarchedEye& eye);
-/// Of that ray.
-PixelFeatures pixelFeatures(const Scene& scene, int x, int y, int steps = MarchedEye::kSteps);
+/// The ray through the middle of pixel (x, y). Nothing is random; the steps of neighbours are shifted against each
+/// other, so that what they miss does not add up to a pattern.
+EyeStart middleOf(const Scene& scene, int x, int y);
 
 }  // namespace virga
