@@ -32,7 +32,7 @@ struct Work {
         features.push_back(pixelFeatures(*eye_));
         for (int i = 0; i < eye_->steps; ++i) samples += isGrid(eye_->media[eye_->step[i].stretch]) ? 1 : 0;
       }
-    const Upsampling upsampling(features, width, height, 8);
+    const Upsampling upsampling(features, width, height, 8, {4, 4});
     const std::vector<Upsampling::Light> none(upsampling.coarse().size());
     light(upsampling.coarse());
     light(upsampling.spread(none, {}, [](int, int, const Upsampling::Light&) {}));

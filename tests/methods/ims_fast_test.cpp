@@ -126,10 +126,10 @@ std::vector<Upsampling::Light> spread(const Upsampling& upsampling, const LightO
   return all;
 }
 
-void expectEvenLightStaysSo(int spacing) {
+void expectEvenLightStaysSo(int spacing, Upsampling::Pixel place) {
   const int width = 50, height = 37;
   const auto features = twoFloors(width, height);
-  const Upsampling upsampling(features, width, height, spacing);
+  const Upsampling upsampling(features, width, height, spacing, place);
   const auto at = [&](int x, int y) -> const PixelFeatures& { return features[static_cast<size_t>(y * width + x)]; };
   const auto lightOf = [&](const Upsampling::Pixel& p) -> Upsampling::Light {
     const PixelFeatures& f = at(p.x, p.y);
@@ -151,7 +151,8 @@ void expectEvenLightStaysSo(int spacing) {
 }
 
 TEST(Upsampling, LightThatIsEvenBehindItsVeilStaysSo) {
-  for (const int spacing : {1, 3, 8, 20}) expectEvenLightStaysSo(spacing);
+  for (const int spacing : {1, 3, 8, 20})
+    for (const int x : {0, 3, 5, -9}) expectEvenLightStaysSo(spacing, {x, 7 - x});
 }
 
 TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
@@ -161,7 +162,7 @@ TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
   features[static_cast<size_t>(9 * width + 11)].depth = 5;
   features[static_cast<size_t>(20 * width + 30)].regular = false;  // ...a mirror...
   features[static_cast<size_t>(4 * width + 4)].regular = false;    // ...and one at a coarse pixel
-  const Upsampling upsampling(features, width, height, 8);
+  const Upsampling upsampling(features, width, height, 8, {4, 4});
   ASSERT_EQ(upsampling.coarse().size(), 5u * 3u);
   std::vector<int> computed;
   const auto lightOf = [&](const Upsampling::Pixel& p) -> Upsampling::Light {
@@ -174,9 +175,43 @@ TEST(Upsampling, PixelsThatNoNeighbourIsLikeAreComputed) {
   EXPECT_EQ(all[4 * width + 4].media[0].r, 7.f);
 }
 
+// One bright pixel among black ones: wherever coarse pixels lie, on average over the passes it counts as one.
+TEST(Upsampling, OverPassesNoPixelTellsMoreThanOthers) {
+  const int width = 60, height = 50, passes = 4096;
+  const std::vector<PixelFeatures> features(static_cast<size_t>(width * height), twoFloors(1, 1)[0]);
+  PerspectiveCamera camera;
+  camera.cropX = 3, camera.cropY = 5;
+  double sum = 0;
+  int met = 0;
+  for (uint32_t pass = 0; pass < passes; ++pass) {
+    const Upsampling upsampling(features, width, height, 8, coarsePlace(camera, 8, pass));
+    const auto isBright = [](const Upsampling::Pixel& p) { return p.x == 29 && p.y == 22; };
+    const auto coarse = upsampling.coarse();
+    if (std::none_of(coarse.begin(), coarse.end(), isBright)) continue;
+    const auto lightOf = [&](const Upsampling::Pixel& p) -> Upsampling::Light {
+      return {{Rgb(isBright(p) ? 1.f : 0.f), {}}, {}};
+    };
+    for (const Upsampling::Light& light : spread(upsampling, lightOf, width, height))
+      sum += static_cast<double>(light.surface[0].g);
+    ++met;
+  }
+  EXPECT_NEAR(met, passes / 64, 2);
+  EXPECT_NEAR(sum / passes, 1, 0.04);
+}
+
+TEST(Upsampling, CoarsePixelsAreThoseOfTheFilm) {
+  PerspectiveCamera whole, crop;
+  crop.cropX = 11, crop.cropY = 5;
+  for (uint32_t pass = 0; pass < 20; ++pass) {
+    const Upsampling::Pixel a = coarsePlace(whole, 8, pass), b = coarsePlace(crop, 8, pass);
+    EXPECT_EQ(a.x, b.x + 11);
+    EXPECT_EQ(a.y, b.y + 5);
+  }
+}
+
 TEST(Upsampling, OnePixelIsAPicture) {
   const auto features = twoFloors(1, 1);
-  const Upsampling upsampling(features, 1, 1, 8);
+  const Upsampling upsampling(features, 1, 1, 8, {4, 4});
   ASSERT_EQ(upsampling.coarse().size(), 1u);
   const auto lightOf = [](const Upsampling::Pixel&) -> Upsampling::Light {
     return {{Rgb(1.f), Rgb(2.f)}, {Rgb(3.f), Rgb(4.f)}};

@@ -132,7 +132,7 @@ class FastPass {
 }  // namespace
 
 void FastRenderer::forget(const ChangeSet& changes) {
-  upsampling_ = nullptr;
+  known_ = false;
   if (!changes.cameraAlone()) tables_ = nullptr;
 }
 
@@ -152,21 +152,20 @@ void FastRenderer::pass(const Scene& scene, const ImsPixels& pixels, const ImsOp
   FastPass own(scene, pixels, options, id, stop, frame);
   // The first pass looks at the middles of pixels: one march for what a pixel shows and for its light.
   const bool atMiddles = id.replicate == 0 && id.index == 0 && pixels.marches();
-  if (atMiddles || !upsampling_) {
-    const size_t all = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
-    if (features_.size() != all) features_ = LargeArray<PixelFeatures>(all);
-    const std::span features(features_.data(), all);
-    upsampling_ = nullptr;
-    if (atMiddles)
-      own.lookAndLight(features);
-    else
-      own.look(features);
-    if (stop.stop_requested()) return;
-    upsampling_ = std::make_unique<Upsampling>(features, frame.width(), frame.height(), options.spacing);
-  }
+  const size_t all = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
+  if (features_.size() != all) features_ = LargeArray<PixelFeatures>(all);
+  const std::span features(features_.data(), all);
+  if (atMiddles)
+    own.lookAndLight(features);
+  else if (!known_)
+    own.look(features);
+  if (stop.stop_requested()) return;
+  known_ = true;
   if (!atMiddles) own.light();
   if (stop.stop_requested()) return;
-  own.fill(*upsampling_);
+  const uint32_t number = id.index * Film::kReplicates + id.replicate;
+  own.fill(
+      {features, frame.width(), frame.height(), options.spacing, coarsePlace(scene.camera, options.spacing, number)});
 }
 
 }  // namespace virga

@@ -25,10 +25,10 @@ class FastRenderer {
             const std::stop_token& stop, PassFrame& frame);
 
  private:
-  LargeArray<PixelFeatures> features_;      ///< of this scene and camera
-  std::unique_ptr<Upsampling> upsampling_;  ///< likewise
-  std::unique_ptr<LampTables> tables_;      ///< of this scene
-  int around_ = 0;                          ///< the medium that had no end when they were made
+  LargeArray<PixelFeatures> features_;
+  bool known_ = false;                  ///< they are of this scene and camera
+  std::unique_ptr<LampTables> tables_;  ///< of this scene
+  int around_ = 0;                      ///< the medium that had no end when they were made
 };
 
 }  // namespace virga

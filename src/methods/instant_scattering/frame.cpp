@@ -31,7 +31,8 @@ class FramePass {
     const auto show = [&](int x, int y, const Upsampling::Light& indirect) {
       indirect.visit([&](Layer layer, Rgb radiance) { frame.add(x, y, layer, radiance); });
     };
-    const Upsampling upsampling(features, frame.width(), frame.height(), options_.spacing);
+    const Upsampling upsampling(features, frame.width(), frame.height(), options_.spacing,
+                                coarsePlace(scene_.camera, options_.spacing, id_.index));
     const std::vector<Upsampling::Pixel> others =
         upsampling.spread(indirectLight(upsampling.coarse(), stop), stop, show);
     const std::vector<Upsampling::Light> light = indirectLight(others, stop);

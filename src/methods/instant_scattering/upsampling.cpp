@@ -52,31 +52,37 @@ struct Upsampling::Filter {
     for (int i = 0; i < block.count; ++i) {
       const auto [x, y] = pixels.pixel[std::min(i, pixels.count - 1)];
       set(block, i, u.features_[u.numberOf(x, y)]);
-      const auto wx = u.splineAt(x - pixels.column * u.spacing_), wy = u.splineAt(y - pixels.row * u.spacing_);
+      const auto wx = u.splineAt(x - u.columns_.cell(pixels.column)), wy = u.splineAt(y - u.rows_.cell(pixels.row));
       for (size_t k = 0; k < 4; ++k) block.wx[k][i] = wx[k], block.wy[k][i] = wy[k];
     }
     for (int tap = 0; tap < UpsamplingBlock::kTaps; ++tap) {
-      const int column = std::clamp(pixels.column - 1 + tap % 4, 0, u.columns_ - 1);
-      const int row = std::clamp(pixels.row - 1 + tap / 4, 0, u.rows_ - 1);
-      taps[tap] = &all[static_cast<size_t>(row * u.columns_ + column)];
+      const int column = std::clamp(pixels.column - 1 + tap % 4, 0, u.columns_.count() - 1);
+      const int row = std::clamp(pixels.row - 1 + tap / 4, 0, u.rows_.count() - 1);
+      taps[tap] = &all[static_cast<size_t>(row * u.columns_.count() + column)];
     }
     weighTaps(block, taps, weights);
   }
 };
 
-Upsampling::Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing)
+CoarseAxis::CoarseAxis(int size, int spacing, int place) : size_(size), spacing_(spacing) {
+  first_ = ((place % spacing) + spacing) % spacing;
+  if (first_ > spacing / 2) first_ -= spacing;
+  count_ = (size - 1 + spacing / 2 - first_) / spacing + 1;
+}
+
+Upsampling::Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing, Pixel place)
     : features_(features),
       width_(width),
       height_(height),
       spacing_(spacing),
-      columns_(roundedUp(width, spacing)),
-      rows_(roundedUp(height, spacing)),
+      columns_(width, spacing, place.x),
+      rows_(height, spacing, place.y),
       blocksPerCell_(roundedUp(spacing, UpsamplingBlock::kEdge)),
-      blocksAcross_((columns_ + 1) * blocksPerCell_),
-      blocksDown_((rows_ + 1) * blocksPerCell_) {
+      blocksAcross_((columns_.count() + 1) * blocksPerCell_),
+      blocksDown_((rows_.count() + 1) * blocksPerCell_) {
   for (int t = 0; t < spacing; ++t) splines_.push_back(spline(static_cast<float>(t) / static_cast<float>(spacing)));
-  for (int j = 0; j < rows_; ++j)
-    for (int i = 0; i < columns_; ++i) coarse_.push_back({middleOf(i, width), middleOf(j, height)});
+  for (int j = 0; j < rows_.count(); ++j)
+    for (int i = 0; i < columns_.count(); ++i) coarse_.push_back({columns_.at(i), rows_.at(j)});
 }
 
 std::vector<Upsampling::Pixel> Upsampling::joined(const std::vector<std::vector<Pixel>>& lists) {
@@ -96,21 +102,17 @@ Upsampling::PixelBlock Upsampling::blockOf(int64_t n) const {
   PixelBlock block;
   block.column = across / blocksPerCell_ - 1, block.row = down / blocksPerCell_ - 1;
   // A cell begins at its coarse pixel.
-  const auto within = [&](int cell, int part, int size, int& begin, int& end) {
-    const int first = cell * spacing_ + spacing_ / 2, own = first + part * UpsamplingBlock::kEdge;
+  const auto within = [&](const CoarseAxis& axis, int cell, int part, int size, int& begin, int& end) {
+    const int own = axis.cell(cell) + part * UpsamplingBlock::kEdge;
     begin = std::max(0, own);
-    end = std::min({size, first + spacing_, own + UpsamplingBlock::kEdge});
+    end = std::min({size, axis.cell(cell + 1), own + UpsamplingBlock::kEdge});
   };
   int x0, x1, y0, y1;
-  within(block.column, across % blocksPerCell_, width_, x0, x1);
-  within(block.row, down % blocksPerCell_, height_, y0, y1);
+  within(columns_, block.column, across % blocksPerCell_, width_, x0, x1);
+  within(rows_, block.row, down % blocksPerCell_, height_, y0, y1);
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) block.pixel[block.count++] = {x, y};
   return block;
-}
-
-const std::array<float, 4>& Upsampling::splineAt(int place) const {
-  return splines_[static_cast<size_t>(place - spacing_ / 2)];
 }
 
 std::vector<UpsamplingTap> Upsampling::tapsOf(std::span<const Light> light) const {
@@ -130,6 +132,15 @@ void Upsampling::lightBlock(const PixelBlock& pixels, const std::vector<Upsampli
     light.known[i] = !needsOwn(own, filter.weights.surfaceSum[i], filter.weights.mediaSum[i]);
   }
   spreadLight(filter.block, filter.taps, filter.weights, light.filtered);
+}
+
+Upsampling::Pixel coarsePlace(const PerspectiveCamera& camera, int spacing, uint32_t pass) {
+  // The additive sequence of the plastic number.
+  const auto moved = [&](double step) {
+    const double x = step * pass;
+    return static_cast<int>((x - std::floor(x)) * spacing);
+  };
+  return {spacing / 2 + moved(0.7548776662) - camera.cropX, spacing / 2 + moved(0.5698402910) - camera.cropY};
 }
 
 }  // namespace virga

@@ -16,6 +16,27 @@
 
 namespace virga {
 
+/// Every n-th of the pixels along an edge of a picture, and the first or last one where the next would lie so near
+/// behind the edge that it tells most of the pixels there.
+class CoarseAxis {
+ public:
+  /// Of `size` pixels; `place` is that of a coarse one, or of any in step with it.
+  CoarseAxis(int size, int spacing, int place);
+
+  int count() const { return count_; }
+  int at(int i) const { return std::clamp(cell(i), 0, size_ - 1); }
+  /// Where the cell behind coarse pixel i begins; that of -1 lies before all of them.
+  int cell(int i) const { return first_ + i * spacing_; }
+  /// Number of the coarse pixel that x is, if it is one.
+  std::optional<int> find(int x) const {
+    const int i = (x - first_ + spacing_ / 2) / spacing_;
+    return at(i) == x ? std::optional(i) : std::nullopt;
+  }
+
+ private:
+  int size_, spacing_, first_, count_;
+};
+
 /// A picture's every n-th pixel in both directions, and how the others are made from them: by a cubic B-spline over
 /// 4 x 4 of them, each weighted by how well its features agree (section 6 of the paper, where the filter is bilinear).
 ///
@@ -23,12 +44,14 @@ namespace virga {
 /// exactly (reflectance and transmittance; opacity): the filter works on the light without it.
 class Upsampling {
  public:
-  /// `features` of the whole picture, which must outlive it; `spacing` >= 1 pixels.
-  Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing);
-
   struct Pixel {
     int x, y;
   };
+
+  /// `features` of the whole picture, which must outlive it; `spacing` >= 1 pixels. `place` of a coarse pixel, or of
+  /// any in step with it.
+  Upsampling(std::span<const PixelFeatures> features, int width, int height, int spacing, Pixel place);
+
   /// The pixels to compute first, row by row.
   const std::vector<Pixel>& coarse() const { return coarse_; }
 
@@ -99,8 +122,8 @@ class Upsampling {
   };
 
   PixelBlock blockOf(int64_t n) const;
-  /// Weights of four coarse columns (or rows), a pixel's place counted from the start of the second one's cell.
-  const std::array<float, 4>& splineAt(int place) const;
+  /// Weights of four coarse columns (or rows), by the pixel's place in the second one's cell.
+  const std::array<float, 4>& splineAt(int place) const { return splines_[static_cast<size_t>(place)]; }
   /// Of the coarse pixels.
   std::vector<UpsamplingTap> tapsOf(std::span<const Light> light) const;
   struct Filter;
@@ -114,20 +137,22 @@ class Upsampling {
   /// Its number, if it is a coarse pixel of which nothing can be said: its own light is taken.
   std::optional<size_t> irregularCoarse(int x, int y) const {
     if (features_[numberOf(x, y)].regular) return std::nullopt;
-    const int i = x / spacing_, j = y / spacing_;
-    if (x != middleOf(i, width_) || y != middleOf(j, height_)) return std::nullopt;
-    return static_cast<size_t>(j) * static_cast<size_t>(columns_) + static_cast<size_t>(i);
+    const std::optional<int> i = columns_.find(x), j = rows_.find(y);
+    if (!i || !j) return std::nullopt;
+    return static_cast<size_t>(*j) * static_cast<size_t>(columns_.count()) + static_cast<size_t>(*i);
   }
-  /// Where coarse column (or row) number i lies in a picture of so many pixels.
-  int middleOf(int i, int size) const { return std::min(i * spacing_ + spacing_ / 2, size - 1); }
 
   std::span<const PixelFeatures> features_;
   int width_, height_, spacing_;
-  int columns_, rows_;  ///< of coarse pixels
-  int blocksPerCell_;   ///< in either direction
+  CoarseAxis columns_, rows_;
+  int blocksPerCell_;  ///< in either direction
   int blocksAcross_, blocksDown_;
   std::vector<std::array<float, 4>> splines_;  ///< at each place between two coarse columns
   std::vector<Pixel> coarse_;
 };
+
+/// A place of coarse pixels in a pass: at the same pixels of the film whatever the crop window, and moved from pass to
+/// pass, so that in the mean no pixel tells more of the picture than others.
+Upsampling::Pixel coarsePlace(const PerspectiveCamera& camera, int spacing, uint32_t pass);
 
 }  // namespace virga
