@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/octahedral.h"
 #include "core/parallel.h"
 
 namespace virga {
@@ -97,6 +98,67 @@ std::vector<float> radiiOfNeighbours(std::span<const PlacedLight> lights, float 
     }
   });
   return radii;
+}
+
+namespace {
+
+/// What a ball sends to the media within it, for each part of its falloff: 1 / d^2 of its middle, and the polynomial of
+/// spreadFalloff() without its last term and that term alone.
+struct LightWithin {
+  float point = 0, edge = 0, core = 0;
+
+  /// `met`: how much of the light of the middle is met between two distances, `u` from the middle, over the radius.
+  void add(float met, float u) {
+    const float t = 1 - u * u;
+    point += met, edge += met * u * u * (1 + t), core += met * square(u * t);
+  }
+  float neededCore() const { return core > 0 ? (point - edge) / core : NearField::kPlainCore; }
+};
+
+/// Optical depth at a distance in the direction of a table's node.
+float depthAt(const DepthTable& table, const float* node, float distance) {
+  const float share = std::max(0.f, (distance - table.view.first) / (table.view.last - table.view.first));
+  const float place =
+      std::min(std::sqrt(share) * static_cast<float>(table.radii - 1), static_cast<float>(table.radii) - 1.001f);
+  const int m = static_cast<int>(place);
+  return lerp(node[m], node[m + 1], place - static_cast<float>(m));
+}
+
+LightWithin lightWithin(const DepthTable& media, const KernelLight& light, float radius) {
+  constexpr int kSteps = 8, kStride = 2;
+  LightWithin all;
+  for (int row = 0; row < media.side; row += kStride)
+    for (int column = 0; column < media.side; column += kStride) {
+      const auto place = [&](int n) { return 2 * static_cast<float>(n) / static_cast<float>(media.side - 1) - 1; };
+      const Vec3 w = fromOctahedron({place(column), place(row)});
+      // The solid angle of a part of an octahedron is as the third power of how much farther out the sphere is.
+      const float angle = std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z),
+                  c = light.ax * w.x + light.ay * w.y + light.az * w.z;
+      const float share =
+          angle * angle * angle * kernels::endScattering<EndKind::henyeyGreenstein>(-c, light.anisotropy);
+      const float* const node = media.depth + (row * media.side + column) * media.radii;
+      float before = 1;
+      for (int i = 0; i < kSteps; ++i) {
+        const float through = kernels::falling(depthAt(media, node, radius * static_cast<float>(i + 1) / kSteps));
+        all.add(share * (before - through), (static_cast<float>(i) + 0.5f) / kSteps);
+        before = through;
+      }
+    }
+  return all;
+}
+
+}  // namespace
+
+LightBall ballWithin(const DepthTable& media, const KernelLight& light, float radius, float mostCore) {
+  constexpr int kMostTries = 24;
+  constexpr float kSmaller = 0.85f;
+  LightBall ball{radius, mostCore};
+  for (int n = 0; n < kMostTries; ++n) {
+    if (n > 0) ball.radius *= kSmaller;
+    const float core = lightWithin(media, light, ball.radius).neededCore();
+    if (core <= mostCore) return {ball.radius, core};
+  }
+  return ball;
 }
 
 float coreFor(float depth) {
