@@ -115,42 +115,31 @@ struct LightWithin {
   float neededCore() const { return core > 0 ? (point - edge) / core : NearField::kPlainCore; }
 };
 
-/// Optical depth at a distance in the direction of a table's node.
-float depthAt(const DepthTable& table, const float* node, float distance) {
-  const float share = std::max(0.f, (distance - table.view.first) / (table.view.last - table.view.first));
-  const float place =
-      std::min(std::sqrt(share) * static_cast<float>(table.radii - 1), static_cast<float>(table.radii) - 1.001f);
-  const int m = static_cast<int>(place);
-  return lerp(node[m], node[m + 1], place - static_cast<float>(m));
-}
-
 LightWithin lightWithin(const DepthTable& media, const KernelLight& light, float radius) {
-  constexpr int kSteps = 8, kStride = 2;
+  constexpr int kEdge = 5, kSteps = 8;  // directions along the edge of an octahedral map; along each
   LightWithin all;
-  for (int row = 0; row < media.side; row += kStride)
-    for (int column = 0; column < media.side; column += kStride) {
-      const auto place = [&](int n) { return 2 * static_cast<float>(n) / static_cast<float>(media.side - 1) - 1; };
-      const Vec3 w = fromOctahedron({place(column), place(row)});
-      // The solid angle of a part of an octahedron is as the third power of how much farther out the sphere is.
-      const float angle = std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z),
-                  c = light.ax * w.x + light.ay * w.y + light.az * w.z;
-      const float share =
-          angle * angle * angle * kernels::endScattering<EndKind::henyeyGreenstein>(-c, light.anisotropy);
-      const float* const node = media.depth + (row * media.side + column) * media.radii;
-      float before = 1;
-      for (int i = 0; i < kSteps; ++i) {
-        const float through = kernels::falling(depthAt(media, node, radius * static_cast<float>(i + 1) / kSteps));
-        all.add(share * (before - through), (static_cast<float>(i) + 0.5f) / kSteps);
-        before = through;
-      }
+  for (int k = 0; k < kEdge * kEdge; ++k) {
+    const auto placeOf = [](int n) { return (2 * static_cast<float>(n) + 1) / kEdge - 1; };
+    const Vec3 w = fromOctahedron({placeOf(k % kEdge), placeOf(k / kEdge)});
+    const float c = light.ax * w.x + light.ay * w.y + light.az * w.z;
+    // The solid angle of a part of the octahedron is as the third power of how much farther out the sphere is.
+    const float angle = std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z);
+    const float share = angle * angle * angle * kernels::endScattering<EndKind::henyeyGreenstein>(c, light.anisotropy);
+    float before = 1;
+    for (int i = 0; i < kSteps; ++i) {
+      const float d = radius * static_cast<float>(i + 1) / kSteps;
+      const float through = kernels::falling(kernels::depthToward(media, w.x * d, w.y * d, w.z * d, d, 1 / d));
+      all.add(share * (before - through), (static_cast<float>(i) + 0.5f) / kSteps);
+      before = through;
     }
+  }
   return all;
 }
 
 }  // namespace
 
 LightBall ballWithin(const DepthTable& media, const KernelLight& light, float radius, float mostCore) {
-  constexpr int kMostTries = 24;
+  constexpr int kMostTries = 6;
   constexpr float kSmaller = 0.85f;
   LightBall ball{radius, mostCore};
   for (int n = 0; n < kMostTries; ++n) {
