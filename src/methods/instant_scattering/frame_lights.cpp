@@ -78,7 +78,8 @@ void fitToMedium(const SceneView& view, const MediaBetween& between, size_t i, F
   const LightVertex& v = *light.vertex;
   const Rgb sigmaT = view.media[v.medium].sigmaTAt(v.p);
   const size_t part = between.partAround(i);
-  if (part == between.parts()) {
+  // In fog the ball is often as wide as the room, and what is put back at walls would light its middle, which is seen.
+  if (part == between.parts() || view.media[v.medium].homogeneous) {
     light.core = coreFor(std::min(kDeepest, light.radius * maxComponent(sigmaT)));
     return;
   }
