@@ -42,6 +42,48 @@ TEST(FrameKernels, ASpreadLightKeepsItsEnergy) {
   EXPECT_NEAR(coreFor(0), NearField::kPlainCore, 7e-3f);
 }
 
+/// A table of what lies all around in a medium that ends at a distance, at optical depth 1 a unit times sigmaT.
+struct TableAround {
+  std::vector<float> depth;
+  DepthTable table;
+
+  TableAround(float sigmaT, float end) {
+    constexpr int kSide = 12, kRadii = 64;
+    table = {nullptr, kSide, kRadii, {1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 4}};
+    for (int node = 0; node < kSide * kSide; ++node)
+      for (int m = 0; m < kRadii; ++m)
+        depth.push_back(sigmaT * std::min(end, 4 * square(static_cast<float>(m) / (kRadii - 1))));
+    table.depth = depth.data();
+  }
+};
+
+// In a medium without end it is the core that is known; where the medium ends, what lies beyond counts for nothing.
+TEST(FrameLights, BallsKeepTheirLightInTheMedium) {
+  const KernelLight light{0, 0, 0, 0, 0, 1, 1, 1, 1, 0};
+  for (const float sigmaT : {0.1f, 2.f, 5.f}) {
+    const LightBall ball = ballWithin(TableAround(sigmaT, 4).table, light, 1, coreFor(6));
+    EXPECT_EQ(ball.radius, 1);
+    EXPECT_NEAR(ball.core / coreFor(sigmaT), 1, 0.05) << sigmaT;
+  }
+  for (const float end : {0.8f, 0.5f}) {
+    const float sigmaT = 2;
+    const LightBall ball = ballWithin(TableAround(sigmaT, end).table, light, 1, coreFor(6));
+    double spread = 0, point = 0, even = 0;
+    const int n = 10000;
+    for (int i = 0; i < n; ++i) {
+      const float d = end * (static_cast<float>(i) + 0.5f) / n, through = std::exp(-sigmaT * d);
+      const float bound = 1 / square(ball.radius);
+      point += static_cast<double>(through);
+      spread += static_cast<double>(through * d * d * kernels::spreadFalloff(d * d, bound, ball.core));
+      even += static_cast<double>(through * d * d * kernels::spreadFalloff(d * d, 1, coreFor(sigmaT)));
+    }
+    EXPECT_NEAR(spread / point, 1, 0.06) << end;
+    EXPECT_LT(even / point, end > 0.6f ? 0.98 : 0.9) << end << ": as if the medium had no end";
+  }
+  EXPECT_LT(ballWithin(TableAround(2, 0.2f).table, light, 1, coreFor(6)).radius, 0.9f) << "wider than the smoke";
+  EXPECT_LT(ballWithin(TableAround(20, 4).table, light, 1, coreFor(6)).radius, 0.9f) << "too deep";
+}
+
 TEST(FrameLights, NeighboursAreThoseOfAllPairs) {
   const auto number = [](int i, double step) { return static_cast<float>(std::fmod(i * step, 1)); };
   std::vector<PlacedLight> lights;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame_lights.h"
 
+#include "core/parallel.h"
 #include "methods/instant_scattering/light_spacing.h"
 #include "methods/instant_scattering/light_visibility.h"
 #include "transport/media_walk.h"
@@ -58,22 +59,34 @@ std::vector<FrameLights::Light> chosenOf(const OfKind& all, LightChoice& choice,
   return chosen;
 }
 
-/// Balls of the lights of one kind, by how they lie.
-void spread(const SceneView& view, std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
+/// Radii of the lights of one kind, by how they lie.
+void spread(std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
   // Measured: docs/decisions/ims-frame-balls.md.
-  constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64, kDeepest = 6;
+  constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64;
   const bool inMedia = kind == VertexKind::medium;
   const float times = inMedia ? kTimesInMedia : kTimesOnSurfaces;
   std::vector<PlacedLight> places;
   for (const FrameLights::Light& l : lights) places.push_back({positionOf(l), brightness(l)});
   const std::vector<float> radii = radiiOfNeighbours(places, times, static_cast<int>(2 * times), inMedia ? 3 : 2);
-  for (size_t i = 0; i < lights.size(); ++i) {
-    const LightVertex& v = *lights[i].vertex;
-    const float radius = radii[i] > 0 ? radii[i] : otherwise;
-    lights[i].radius = radius;
-    if (inMedia)
-      lights[i].core = coreFor(std::min(kDeepest, radius * maxComponent(view.media[v.medium].sigmaTAt(v.p))));
+  for (size_t i = 0; i < lights.size(); ++i) lights[i].radius = radii[i] > 0 ? radii[i] : otherwise;
+}
+
+/// Fits a light's ball to the medium that it lies in: point number i of `between`.
+void fitToMedium(const SceneView& view, const MediaBetween& between, size_t i, FrameLights::Light& light) {
+  constexpr float kDeepest = 6;
+  static const float kMostCore = coreFor(kDeepest);
+  const LightVertex& v = *light.vertex;
+  const Rgb sigmaT = view.media[v.medium].sigmaTAt(v.p);
+  const size_t part = between.partAround(i);
+  // In fog the ball is often as wide as the room, and what is put back at walls would light its middle, which is seen.
+  if (part == between.parts() || view.media[v.medium].homogeneous) {
+    light.core = coreFor(std::min(kDeepest, light.radius * maxComponent(sigmaT)));
+    return;
   }
+  const float most = maxComponent(sigmaT);
+  const int channel = between.grey() || sigmaT.r == most ? 0 : sigmaT.g == most ? 1 : 2;
+  const LightBall ball = ballWithin(between.table(i, part, channel), light.kernel, light.radius, kMostCore);
+  light.radius = ball.radius, light.core = ball.core;
 }
 
 }  // namespace
@@ -103,8 +116,8 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   const size_t onSurface = lights_.size();
   lights_.insert(lights_.end(), more.begin(), more.end());
   if (options.balls) {
-    spread(view, std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
-    spread(view, std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
+    spread(std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
+    spread(std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
   }
   if (options.shadows == ShadowMapping::maps) {
     refuseTooManyMaps(lights_.size(), options.maps.resolution, "lights");
@@ -116,6 +129,11 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   std::vector<Vec3> places;
   for (const Light& l : lights_) places.push_back(aside(l, view));
   between_ = MediaBetween(scene, std::move(places), {}, stop);
+  if (!options.balls || stop.stop_requested()) return;
+  parallelFor(static_cast<int64_t>(lights_.size() - onSurface), 16, [&](int64_t n) {
+    const size_t i = onSurface + static_cast<size_t>(n);
+    fitToMedium(view, between_, i, lights_[i]);
+  });
 }
 
 float FrameLights::medianRadius() const {
