@@ -2,6 +2,7 @@
 #include "transport/media_bounds.h"
 
 #include <algorithm>
+#include <numeric>
 
 #include "scene/scene_parts.h"
 #include "transport/virtual_lights.h"
@@ -69,7 +70,7 @@ std::vector<Bounds> declaredPlaces(const Scene& scene, int medium) {
   return everywhere ? std::vector<Bounds>{kEverywhere} : places;
 }
 
-Bounds joined(Bounds a, const Bounds& b) {
+Bounds unionOf(Bounds a, const Bounds& b) {
   a.extend(b);
   return a;
 }
@@ -79,7 +80,7 @@ Bounds joined(Bounds a, const Bounds& b) {
 float apart(const Bounds& a, const Bounds& b) {
   if (overlap(a, b)) return 0;
   const float least = std::min(length(a.extent()), length(b.extent()));
-  return length(joined(a, b).extent()) / std::max(least, 1e-12f);
+  return length(unionOf(a, b).extent()) / std::max(least, 1e-12f);
 }
 
 }  // namespace
@@ -113,13 +114,14 @@ Bounds boundsOfMedia(const Scene& scene) {
   return bounds;
 }
 
-std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most) {
+std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most, int without) {
   constexpr float kApart = 2;
   constexpr size_t kTooMany = 64;
   std::vector<Bounds> boxes;
   for (int m = 0; m < scene.view.media.size; ++m)
-    for (const Bounds& place : placesOf(scene, m)) boxes.push_back(place);
-  if (boxes.size() > kTooMany) return {boundsOfMedia(scene)};
+    if (m != without)
+      for (const Bounds& place : placesOf(scene, m)) boxes.push_back(place);
+  if (boxes.size() > kTooMany) boxes.assign(1, std::accumulate(boxes.begin(), boxes.end(), Bounds(), unionOf));
   for (;;) {
     float least = kInfinity;
     size_t first = 0, second = 0;

@@ -28,8 +28,8 @@ void visitFilledCells(const CoarseGridView& cells, const Visit& visit) {
 std::vector<Bounds> placesOf(const Scene& scene, int medium);
 /// A box that holds all media, likewise: nothing is missed, though there may be less in it. Empty if there are none.
 Bounds boundsOfMedia(const Scene& scene);
-/// Boxes without common points that hold all media, `most` at most (> 0): media that are wider than the gap between
-/// them share one.
-std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most);
+/// Boxes without common points that hold all media, or all but `without`, `most` at most (> 0): media that are wider
+/// than the gap between them share one.
+std::vector<Bounds> boxesOfMedia(const Scene& scene, size_t most, int without = MediaState::kNone);
 
 }  // namespace virga

@@ -129,9 +129,10 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
 }
 
 EmissionTargets mediaTargets(const Scene& scene, float share) {
-  const int endless = endlessMedium(scene);
-  if (!(share > 0) || (endless != MediaState::kNone && !endsByItself(scene.view.media[endless]))) return {};
-  const std::vector<Bounds> boxes = boxesOfMedia(scene, EmissionTargets::kMost);
+  if (!(share > 0)) return {};
+  const int around = endlessMedium(scene);
+  const bool endless = around != MediaState::kNone && !endsByItself(scene.view.media[around]);
+  const std::vector<Bounds> boxes = boxesOfMedia(scene, EmissionTargets::kMost, endless ? around : MediaState::kNone);
   EmissionTargets targets;
   for (const Bounds& box : boxes)
     if (const float radius = 0.5f * length(box.extent()); radius > 0)

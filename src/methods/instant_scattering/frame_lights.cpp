@@ -4,6 +4,7 @@
 #include "core/parallel.h"
 #include "methods/instant_scattering/light_spacing.h"
 #include "methods/instant_scattering/light_visibility.h"
+#include "transport/media_bounds.h"
 #include "transport/media_walk.h"
 
 namespace virga {
@@ -35,7 +36,29 @@ struct OfKind {
   std::vector<LightChoice::Candidate> candidates;
 };
 
-OfKind lightsOf(const SceneView& view, const VirtualLights& all, VertexKind kind) {
+/// How much the lights count for what can be seen, by how far they are from where things are: in fog without end walks
+/// leave lights far out, which hardly shine on anything.
+class Nearness {
+ public:
+  explicit Nearness(const Scene& scene) : near_(scene.view.bounds) {
+    for (const EmitterView& e : scene.view.emitters)
+      if (e.isLocal() && e.isDelta()) near_.extend(e.position);
+    for (const Bounds& box : boxesOfMedia(scene, 1, endlessMedium(scene))) near_.extend(box);
+    radius2_ = lengthSquared(near_.extent()) / 4;
+  }
+  float at(Vec3 p) const {
+    const Vec3 beyond = max(max(near_.lo - p, p - near_.hi), Vec3(0.f));
+    return radius2_ > 0 ? radius2_ / (radius2_ + lengthSquared(beyond)) : 1;
+  }
+
+ private:
+  Bounds near_;
+  float radius2_;
+};
+
+OfKind lightsOf(const Scene& scene, const VirtualLights& all, VertexKind kind) {
+  const SceneView& view = scene.view;
+  const Nearness nearness(scene);
   OfKind found;
   for (size_t walk = 0; walk + 1 < all.firstOf.size(); ++walk)
     for (size_t i = all.firstOf[walk]; i < all.firstOf[walk + 1]; ++i) {
@@ -44,7 +67,7 @@ OfKind lightsOf(const SceneView& view, const VirtualLights& all, VertexKind kind
       const FrameLights::Light l = lightOf(view, v, all.walks());
       found.lights.push_back(l);
       found.candidates.push_back(
-          {static_cast<uint64_t>(walk) << 32 | static_cast<uint32_t>(v.depth), v.p, brightness(l)});
+          {static_cast<uint64_t>(walk) << 32 | static_cast<uint32_t>(v.depth), v.p, brightness(l) * nearness.at(v.p)});
     }
   return found;
 }
@@ -106,8 +129,8 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
                          const std::stop_token& stop)
     : virtualLights_(std::move(lights)) {
   const SceneView& view = scene.view;
-  const OfKind onSurfaces = lightsOf(view, virtualLights_, VertexKind::surface),
-               inMedia = lightsOf(view, virtualLights_, VertexKind::medium);
+  const OfKind onSurfaces = lightsOf(scene, virtualLights_, VertexKind::surface),
+               inMedia = lightsOf(scene, virtualLights_, VertexKind::medium);
   const auto most = static_cast<size_t>(options.most);
   const size_t surfaceShare = std::max(std::max<size_t>(1, most / 2), most - std::min(most, inMedia.lights.size()));
   lights_ = chosenOf(onSurfaces, kept.onSurfaces, surfaceShare, options.turn);
