@@ -74,7 +74,10 @@ __global__ void seeAndLight(SceneView scene, StubRays rays, VirtualLightsView li
   MarchedEye eye;
   marchEye(scene, rays, camera.ray(0.5f, 0.5f), 0.5f, eye, options.eyeSteps);
   seen[threadIdx.x] = pixelFeatures(eye);
-  out[threadIdx.x] = paths.light(eye, sampler).sum();
+  RandomNumbers numbers{sampler};
+  LayerRadiance radiance;
+  paths.marched().add(eye, radiance, numbers);
+  out[threadIdx.x] = radiance.sum();
 }
 
 /// Receivers of a frame from `i` on.
