@@ -15,8 +15,8 @@ Vec3 aside(const FrameLights::Light& light, const SceneView& view) {
 
 FrameLights::Light lightOf(const SceneView& view, const LightVertex& v, int walks) {
   const bool onSurface = v.kind == VertexKind::surface;
-  FrameLights::Light light{{}, EndKind::lambertian,   &v,           1 / static_cast<float>(walks),
-                           0,  NearField::kPlainCore, v.surface < 0};
+  FrameLights::Light light{{}, EndKind::lambertian, &v,           1 / static_cast<float>(walks),
+                           0,  NearField().core,    v.surface < 0};
   float g = 0;
   if (!onSurface) light.plain = plainPhase(view.media[v.medium].phaseAt(v.p), light.kind, g);
   const Vec3 axis = onSurface ? v.normal : v.wi;
@@ -58,21 +58,40 @@ std::vector<FrameLights::Light> chosenOf(const OfKind& all, LightChoice& choice,
   return chosen;
 }
 
+/// Extinction of all media at the place of a light in one of them [1/unit].
+Rgb sigmaTAround(const Scene& scene, int endless, const LightVertex& v) {
+  const SceneView& view = scene.view;
+  const Rgb own = view.media[v.medium].sigmaTAt(v.p);
+  if (view.media.size == 1 && view.boundaries.size <= 1) return own;
+  const MediaState media = mediaAt(scene, v.p, endless);
+  Rgb sum;
+  for (int i = 0; i < media.count(); ++i) sum += view.media[media.medium(i)].sigmaTAt(v.p);
+  return isBlack(sum) ? own : sum;  // at the very border of its medium
+}
+
+/// NearField::core of a light in media, by their optical depth within its radius.
+KernelRgb coresFor(Rgb depth) {
+  constexpr float kDeepest = 6;  // measured: docs/decisions/ims-frame-balls.md
+  const auto core = [&](float d) { return coreFor(std::min(kDeepest, d)); };
+  const float red = core(depth.r);
+  if (depth.r == depth.g && depth.r == depth.b) return {red, red, red};
+  return {red, core(depth.g), core(depth.b)};
+}
+
 /// Balls of the lights of one kind, by how they lie.
-void spread(const SceneView& view, std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
+void spread(const Scene& scene, std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
   // Measured: docs/decisions/ims-frame-balls.md.
-  constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64, kDeepest = 6;
+  constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64;
   const bool inMedia = kind == VertexKind::medium;
   const float times = inMedia ? kTimesInMedia : kTimesOnSurfaces;
   std::vector<PlacedLight> places;
   for (const FrameLights::Light& l : lights) places.push_back({positionOf(l), brightness(l)});
   const std::vector<float> radii = radiiOfNeighbours(places, times, static_cast<int>(2 * times), inMedia ? 3 : 2);
+  const int endless = endlessMedium(scene);
   for (size_t i = 0; i < lights.size(); ++i) {
-    const LightVertex& v = *lights[i].vertex;
     const float radius = radii[i] > 0 ? radii[i] : otherwise;
     lights[i].radius = radius;
-    if (inMedia)
-      lights[i].core = coreFor(std::min(kDeepest, radius * maxComponent(view.media[v.medium].sigmaTAt(v.p))));
+    if (inMedia) lights[i].core = coresFor(sigmaTAround(scene, endless, *lights[i].vertex) * radius);
   }
 }
 
@@ -103,8 +122,8 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   const size_t onSurface = lights_.size();
   lights_.insert(lights_.end(), more.begin(), more.end());
   if (options.balls) {
-    spread(view, std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
-    spread(view, std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
+    spread(scene, std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
+    spread(scene, std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
   }
   if (options.shadows == ShadowMapping::maps) {
     refuseTooManyMaps(lights_.size(), options.maps.resolution, "lights");
