@@ -262,7 +262,7 @@ VirtualLights KeptWalks::lights(const Scene& scene, const WalkOptions& options, 
   const bool anyDue = std::any_of(blocks_.begin(), blocks_.end(), isDue);
   const Defence defence = anyDue ? defenceOf(scene, *extinctions) : Defence();
   const KeptWalker walker(scene, defence.rates, options.maxDepth);
-  const WalkStarts starts(scene, anyDue ? mediaTarget(scene, options.aimed) : EmissionTarget());
+  const WalkStarts starts(scene, anyDue ? mediaTargets(scene, options.aimed) : EmissionTargets());
   std::vector<VirtualLights> parts(count);
   parallelFor(static_cast<int64_t>(count), 1, [&](int64_t b) {
     if (stop.stop_requested()) return;

@@ -99,8 +99,11 @@ bool contains(const Bounds& outer, Bounds inner) {
 
 }  // namespace
 
-WalkStarts::WalkStarts(const Scene& scene, const EmissionTarget& target)
-    : scene_(scene), target_(target), endless_(endlessMedium(scene)), reach_(reachFromInfinity(scene.view, endless_)) {}
+WalkStarts::WalkStarts(const Scene& scene, const EmissionTargets& targets)
+    : scene_(scene),
+      targets_(targets),
+      endless_(endlessMedium(scene)),
+      reach_(reachFromInfinity(scene.view, endless_)) {}
 
 bool WalkStarts::serve(const WalkStarts& next) const {
   if (endless_ != next.endless_ || !contains(reach_, next.reach_)) return false;
@@ -118,24 +121,28 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   const auto choice = view.emitterChoice.sample(sampler.next1D());
   const EmitterView& emitter = view.emitters[choice.index];
   const Vec2 uPosition = sampler.next2D(), uDirection = sampler.next2D();
-  const EmittedRay emitted = sampleEmittedRay(view, emitter, reach_, uPosition, uDirection, target_);
+  const EmittedRay emitted = sampleEmittedRay(view, emitter, reach_, uPosition, uDirection, targets_);
   if (isBlack(emitted.flux)) return {};
   Start start{{emitted.ray, mediaAt(scene_, emitted.ray.o, endless_), 0}, emitted.flux / choice.probability};
   if (emitter.infinite()) start.flux *= transmittanceFromInfinity(view, start.at.media);
   return start;
 }
 
-EmissionTarget mediaTarget(const Scene& scene, float share) {
-  if (!(share > 0) || endlessMedium(scene) != MediaState::kNone) return {};
-  const Bounds media = boundsOfMedia(scene);
-  const float radius = media.empty() ? 0 : 0.5f * length(media.extent());
-  return radius > 0 ? EmissionTarget{media.center(), radius, share} : EmissionTarget{};
+EmissionTargets mediaTargets(const Scene& scene, float share) {
+  const int endless = endlessMedium(scene);
+  if (!(share > 0) || (endless != MediaState::kNone && !endsByItself(scene.view.media[endless]))) return {};
+  const std::vector<Bounds> boxes = boxesOfMedia(scene, EmissionTargets::kMost);
+  EmissionTargets targets;
+  for (const Bounds& box : boxes)
+    if (const float radius = 0.5f * length(box.extent()); radius > 0)
+      targets.add({box.center(), radius, share / static_cast<float>(boxes.size())});
+  return targets;
 }
 
 VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options, const SampleId& id,
                                  const std::stop_token& stop) {
   const int blocks = (options.walks + kBlock - 1) / kBlock;
-  const WalkStarts starts(scene, mediaTarget(scene, options.aimed));
+  const WalkStarts starts(scene, mediaTargets(scene, options.aimed));
   std::vector<VirtualLights> parts(static_cast<size_t>(blocks));
   parallelFor(blocks, 1, [&](int64_t b) {
     if (stop.stop_requested()) return;

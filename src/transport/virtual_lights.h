@@ -41,9 +41,9 @@ VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options,
 /// MediaState::kNone where there is none.
 int endlessMedium(const Scene& scene);
 
-/// The sphere around the media that a share of the walks is aimed at; none where a medium has no end. It does not
-/// depend on the camera, which may move among the lights.
-EmissionTarget mediaTarget(const Scene& scene, float share);
+/// Spheres around the parts of the media that lie apart, at which a share of the walks is aimed; none where the sensor
+/// declares a medium that has no end. They do not depend on the camera, which may move among the lights.
+EmissionTargets mediaTargets(const Scene& scene, float share);
 
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.
 ///
@@ -51,8 +51,8 @@ EmissionTarget mediaTarget(const Scene& scene, float share);
 /// walks start outside of its values, though these may lie beyond all shapes.
 class WalkStarts {
  public:
-  /// `target`: where some of the walks are aimed.
-  explicit WalkStarts(const Scene& scene, const EmissionTarget& target = {});
+  /// `targets`: where some of the walks are aimed.
+  explicit WalkStarts(const Scene& scene, const EmissionTargets& targets = {});
 
   struct Start {
     MediaRay at;
@@ -64,7 +64,7 @@ class WalkStarts {
 
  private:
   const Scene& scene_;
-  EmissionTarget target_;
+  EmissionTargets targets_;
   int endless_;
   Bounds reach_;  ///< all that light from infinity is to meet
 };

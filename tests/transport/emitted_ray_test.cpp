@@ -110,17 +110,17 @@ std::vector<Light> lights() {
 
 class Emission {
  public:
-  explicit Emission(const Light& light, const EmissionTarget& target = {})
-      : scene_(test::build(light.elements + kPatch)), target_(target) {}
+  explicit Emission(const Light& light, const EmissionTargets& targets = {})
+      : scene_(test::build(light.elements + kPatch)), targets_(targets) {}
   EmittedRay ray(Pcg32& random) const {
     const Vec2 position{random.next(), random.next()}, direction{random.next(), random.next()};
-    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], scene_->view.bounds, position, direction, target_);
+    return sampleEmittedRay(scene_->view, scene_->view.emitters[0], scene_->view.bounds, position, direction, targets_);
   }
   const SceneView& view() const { return scene_->view; }
 
  private:
   SceneSnapshot scene_;
-  EmissionTarget target_;
+  EmissionTargets targets_;
 };
 
 TEST(EmittedRay, CarriesTheLightsPower) {
@@ -182,8 +182,8 @@ std::vector<stats::Moments> byConnections(const Emission& emission, int channel)
   return cells;
 }
 
-double arrivalP(const Light& light, float shift = 0, const EmissionTarget& target = {}) {
-  const Emission emission(light, target);
+double arrivalP(const Light& light, float shift = 0, const EmissionTargets& targets = {}) {
+  const Emission emission(light, targets);
   double p = 1;
   for (const int channel : {0, 2}) {
     const auto rays = byRays(emission, channel, shift), connections = byConnections(emission, channel);
@@ -204,25 +204,43 @@ TEST(EmittedRay, ArrivesWhereTheLightIsSeen) {
 
 // --- aimed at a part of the scene: the same light, and more of the rays ---
 
-/// The share of the rays that meet the target.
-double meets(const Light& light, const EmissionTarget& target, float share) {
-  const Emission emission(light, {target.center, target.radius, share});
+/// The share of the rays that meet a sphere.
+double meets(const Light& light, const EmissionTargets& targets, const EmissionTargets::Sphere& sphere) {
+  const Emission emission(light, targets);
   Pcg32 random(4);
   const int n = 20'000;
   int met = 0;
   for (int i = 0; i < n; ++i) {
     const EmittedRay r = emission.ray(random);
-    const Vec3 way = target.center - r.ray.o;
-    met += !isBlack(r.flux) && length(way - r.ray.d * dot(way, r.ray.d)) < target.radius && dot(way, r.ray.d) > 0;
+    const Vec3 way = sphere.center - r.ray.o;
+    met += !isBlack(r.flux) && length(way - r.ray.d * dot(way, r.ray.d)) < sphere.radius && dot(way, r.ray.d) > 0;
   }
   return static_cast<double>(met) / n;
 }
 
+EmissionTargets at(std::initializer_list<EmissionTargets::Sphere> spheres) {
+  EmissionTargets targets;
+  for (const EmissionTargets::Sphere& s : spheres) targets.add(s);
+  return targets;
+}
+
 TEST(EmittedRay, AimedRaysCarryTheSameLight) {
-  const EmissionTarget target{{0.2f, 0, kPatchZ}, 0.3f, 0.6f};  // the patch is in it in part
+  const EmissionTargets::Sphere sphere{{0.2f, 0, kPatchZ}, 0.3f, 0.6f};  // the patch is in it in part
   for (const Light& light : lights()) {
-    EXPECT_GT(arrivalP(light, 0, target), 1e-4) << light.name;
-    EXPECT_GT(meets(light, target, target.share), 1.3 * meets(light, target, 0)) << light.name;
+    EXPECT_GT(arrivalP(light, 0, at({sphere})), 1e-4) << light.name;
+    EXPECT_GT(meets(light, at({sphere}), sphere), 1.3 * meets(light, {}, sphere)) << light.name;
+  }
+}
+
+// Targets that overlap, one beside them, and one around all lamps, at which no lamp among them can aim.
+TEST(EmittedRay, RaysAimedAtManyPlacesCarryTheSameLight) {
+  const EmissionTargets::Sphere left{{-0.3f, 0.2f, kPatchZ}, 0.25f, 0.2f}, over{{-0.1f, 0, kPatchZ}, 0.3f, 0.2f},
+      right{{0.4f, -0.3f, kPatchZ}, 0.15f, 0.2f}, around{{0, 0, 0}, 1.4f, 0.2f};
+  const EmissionTargets all = at({left, over, right, around});
+  for (const Light& light : lights()) {
+    EXPECT_GT(arrivalP(light, 0, all), 1e-4) << light.name;
+    for (const EmissionTargets::Sphere& s : {left, right})
+      EXPECT_GT(meets(light, all, s), 1.3 * meets(light, {}, s)) << light.name;
   }
 }
 

@@ -2,6 +2,7 @@
 #include "methods/instant_scattering/frame.h"
 
 #include "core/parallel.h"
+#include "methods/instant_scattering/small_media.h"
 
 namespace virga {
 namespace {
@@ -28,6 +29,7 @@ class FramePass {
     width_ = frame.width();
     lightDirectly(stop, features, frame);
     if (stop.stop_requested()) return false;
+    setSmallMediaApart(scene_, options_.spacing, frame.width(), frame.height(), features);
     const auto show = [&](int x, int y, const Upsampling::Light& indirect) {
       indirect.visit([&](Layer layer, Rgb radiance) { frame.add(x, y, layer, radiance); });
     };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "methods/instant_scattering/frame_lights.h"
 
+#include "core/parallel.h"
 #include "methods/instant_scattering/light_spacing.h"
 #include "methods/instant_scattering/light_visibility.h"
 #include "transport/media_walk.h"
@@ -69,17 +70,18 @@ Rgb sigmaTAround(const Scene& scene, int endless, const LightVertex& v) {
   return isBlack(sum) ? own : sum;  // at the very border of its medium
 }
 
+constexpr float kDeepest = 6;  // measured: docs/decisions/ims-frame-balls.md
+
 /// NearField::core of a light in media, by their optical depth within its radius.
 KernelRgb coresFor(Rgb depth) {
-  constexpr float kDeepest = 6;  // measured: docs/decisions/ims-frame-balls.md
-  const auto core = [&](float d) { return coreFor(std::min(kDeepest, d)); };
+  const auto core = [](float d) { return coreFor(std::min(kDeepest, d)); };
   const float red = core(depth.r);
   if (depth.r == depth.g && depth.r == depth.b) return {red, red, red};
   return {red, core(depth.g), core(depth.b)};
 }
 
-/// Balls of the lights of one kind, by how they lie.
-void spread(const Scene& scene, std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
+/// Radii of the lights of one kind, by how they lie.
+void spread(std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
   // Measured: docs/decisions/ims-frame-balls.md.
   constexpr float kTimesOnSurfaces = 12, kTimesInMedia = 64;
   const bool inMedia = kind == VertexKind::medium;
@@ -87,12 +89,27 @@ void spread(const Scene& scene, std::span<FrameLights::Light> lights, VertexKind
   std::vector<PlacedLight> places;
   for (const FrameLights::Light& l : lights) places.push_back({positionOf(l), brightness(l)});
   const std::vector<float> radii = radiiOfNeighbours(places, times, static_cast<int>(2 * times), inMedia ? 3 : 2);
-  const int endless = endlessMedium(scene);
-  for (size_t i = 0; i < lights.size(); ++i) {
-    const float radius = radii[i] > 0 ? radii[i] : otherwise;
-    lights[i].radius = radius;
-    if (inMedia) lights[i].core = coresFor(sigmaTAround(scene, endless, *lights[i].vertex) * radius);
+  for (size_t i = 0; i < lights.size(); ++i) lights[i].radius = radii[i] > 0 ? radii[i] : otherwise;
+}
+
+/// Fits a light's ball to the media that it lies in: point number i of `between`.
+void fitToMedia(const Scene& scene, int endless, const MediaBetween& between, size_t i, FrameLights::Light& light) {
+  const LightVertex& v = *light.vertex;
+  const size_t part = between.partAround(i);
+  const Rgb depth = sigmaTAround(scene, endless, v) * light.radius;
+  // In thin fog it is often as wide as the room, and what is put back at walls would light its middle, which is seen.
+  constexpr float kThin = 2;
+  const bool thinFog = scene.view.media[v.medium].homogeneous && maxComponent(depth) < kThin;
+  if (part == between.parts() || thinFog) {
+    light.core = coresFor(depth);
+    return;
   }
+  static const float kMostCore = coreFor(kDeepest);
+  const DepthTable tables[3] = {between.table(i, part, 0), between.table(i, part, between.grey() ? 0 : 1),
+                                between.table(i, part, between.grey() ? 0 : 2)};
+  const LightBall ball =
+      ballWithin(std::span(tables).first(between.grey() ? 1 : 3), light.kernel, light.radius, kMostCore);
+  light.radius = ball.radius, light.core = ball.core;
 }
 
 }  // namespace
@@ -122,8 +139,8 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   const size_t onSurface = lights_.size();
   lights_.insert(lights_.end(), more.begin(), more.end());
   if (options.balls) {
-    spread(scene, std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
-    spread(scene, std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
+    spread(std::span(lights_).first(onSurface), VertexKind::surface, options.radius);
+    spread(std::span(lights_).subspan(onSurface), VertexKind::medium, options.radius);
   }
   if (options.shadows == ShadowMapping::maps) {
     refuseTooManyMaps(lights_.size(), options.maps.resolution, "lights");
@@ -135,6 +152,12 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   std::vector<Vec3> places;
   for (const Light& l : lights_) places.push_back(aside(l, view));
   between_ = MediaBetween(scene, std::move(places), {}, stop);
+  if (!options.balls || stop.stop_requested()) return;
+  const int endless = endlessMedium(scene);
+  parallelFor(static_cast<int64_t>(lights_.size() - onSurface), 16, [&](int64_t n) {
+    const size_t i = onSurface + static_cast<size_t>(n);
+    fitToMedia(scene, endless, between_, i, lights_[i]);
+  });
 }
 
 float FrameLights::medianRadius() const {

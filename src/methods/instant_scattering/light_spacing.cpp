@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/octahedral.h"
 #include "core/parallel.h"
 
 namespace virga {
@@ -97,6 +98,97 @@ std::vector<float> radiiOfNeighbours(std::span<const PlacedLight> lights, float 
     }
   });
   return radii;
+}
+
+namespace {
+
+/// What a ball sends to the media within it, for each part of its falloff: 1 / d^2 of its middle, and the polynomial of
+/// spreadFalloff() without its last term and that term alone.
+struct LightWithin {
+  float point = 0, edge = 0, core = 0;
+
+  /// `met`: how much of the light of the middle is met between two distances, `u` from the middle, over the radius.
+  void add(float met, float u) {
+    const float t = 1 - u * u;
+    point += met, edge += met * u * u * (1 + t), core += met * square(u * t);
+  }
+  float neededCore() const { return core > 0 ? (point - edge) / core : NearField::kPlainCore; }
+};
+
+/// What a light's table says in a few directions all around, linear between its nodes, as the kernels' loop reads it.
+class DepthsAround {
+ public:
+  DepthsAround(const DepthTable& table, const KernelLight& light) : table_(table) {
+    for (int k = 0; k < kDirections; ++k) {
+      const Vec2 place = {(2 * static_cast<float>(k % kEdge) + 1) / kEdge,
+                          (2 * static_cast<float>(k / kEdge) + 1) / kEdge};
+      const Vec3 w = fromOctahedron({place.x - 1, place.y - 1});
+      // The solid angle of a part of the octahedron is as the third power of how much farther out the sphere is.
+      const float angle = std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z);
+      const float c = light.ax * w.x + light.ay * w.y + light.az * w.z;
+      share_[k] = angle * angle * angle * kernels::endScattering<EndKind::henyeyGreenstein>(c, light.anisotropy);
+      blend(place);
+    }
+  }
+
+  LightWithin within(float radius) const {
+    LightWithin all;
+    int node[kSteps];
+    float beyond[kSteps];
+    for (int i = 0; i < kSteps; ++i) {
+      const float d = radius * static_cast<float>(i + 1) / kSteps, reach = d / table_.view.last;
+      const float m =
+          std::fmin(std::sqrt(reach) * static_cast<float>(table_.radii - 1), static_cast<float>(table_.radii) - 1.001f);
+      node[i] = static_cast<int>(m), beyond[i] = m - static_cast<float>(node[i]);
+    }
+    for (int k = 0; k < kDirections; ++k) {
+      const float* const depth = &depth_[static_cast<size_t>(k * table_.radii)];
+      float before = 1;
+      for (int i = 0; i < kSteps; ++i) {
+        const float through = kernels::falling(lerp(depth[node[i]], depth[node[i] + 1], beyond[i]));
+        all.add(share_[k] * (before - through), (static_cast<float>(i) + 0.5f) / kSteps);
+        before = through;
+      }
+    }
+    return all;
+  }
+
+ private:
+  static constexpr int kEdge = 5, kDirections = kEdge * kEdge, kSteps = 8;
+
+  /// Adds the depths at all distances in a direction; `place` in [0, 2)^2 on the map.
+  void blend(Vec2 place) {
+    const float x = place.x * 0.5f * static_cast<float>(table_.side - 1),
+                y = place.y * 0.5f * static_cast<float>(table_.side - 1);
+    const int column = static_cast<int>(x), row = static_cast<int>(y);
+    const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
+    const float* const at = table_.depth + (row * table_.side + column) * table_.radii;
+    const float* const below = at + table_.side * table_.radii;
+    for (int m = 0; m < table_.radii; ++m)
+      depth_.push_back(lerp(lerp(at[m], at[table_.radii + m], fx), lerp(below[m], below[table_.radii + m], fx), fy));
+  }
+
+  DepthTable table_;
+  float share_[kDirections];
+  std::vector<float> depth_;  ///< direction by direction
+};
+
+}  // namespace
+
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore) {
+  constexpr int kMostTries = 6;
+  constexpr float kSmaller = 0.85f;
+  std::vector<DepthsAround> channels;
+  for (const DepthTable& table : media) channels.emplace_back(table, light);
+  for (int n = 0;; ++n, radius *= kSmaller) {
+    float core[3], most = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      core[c] = c < channels.size() ? channels[c].within(radius).neededCore() : core[0];
+      most = std::max(most, core[c]);
+    }
+    if (most > mostCore && n + 1 < kMostTries) continue;
+    return {radius, {std::min(core[0], mostCore), std::min(core[1], mostCore), std::min(core[2], mostCore)}};
+  }
 }
 
 float coreFor(float depth) {

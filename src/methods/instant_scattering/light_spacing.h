@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/vec.h"
+#include "methods/instant_scattering/frame_kernels.h"
 
 namespace virga {
 
@@ -22,5 +23,17 @@ std::vector<float> radiiOfNeighbours(std::span<const PlacedLight> lights, float 
 /// NearField::core for which a ball whose radius is `depth` mean free paths of a medium sends as much light to the
 /// medium within it as its middle would through what lies between; 7 in vacuum. Error 1e-3.
 float coreFor(float depth);
+
+/// A light's ball: its radius [unit] and NearField::core.
+struct LightBall {
+  float radius;
+  KernelRgb core;
+};
+
+/// The ball of a light in a medium, at most as wide as `radius`, that sends as much light to the media within it as its
+/// middle would. A ball that would have to be brighter in its middle than `mostCore` for that, because it is wider than
+/// the smoke that it lies in or many mean free paths deep, is made smaller. `media`: optical depths all around the
+/// light (DepthView::stretch is 1), of each channel or one for all. The light's own directions are those of its g.
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore);
 
 }  // namespace virga

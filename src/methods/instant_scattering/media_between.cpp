@@ -173,6 +173,11 @@ void MediaBetween::fillNode(const Scene& scene, size_t part, MediaRay r, const s
   for (int c = 0; c < channels_; ++c) way.write(distances, c, out + static_cast<size_t>(c) * sizeOfTable());
 }
 
+size_t MediaBetween::partAround(size_t i) const {
+  const auto holds = [p = points_[i]](const Bounds& b) { return max(min(p, b.hi), b.lo) == p; };
+  return static_cast<size_t>(std::find_if(boxes_.begin(), boxes_.end(), holds) - boxes_.begin());
+}
+
 void MediaBetween::look(size_t i, const KernelReceivers& to, float* seen[3]) const {
   const Vec3 p = points_[i];
   for (int c = 0; c < 3; ++c) {

@@ -39,6 +39,8 @@ class MediaBetween {
     const size_t of = i * parts() + part, number = of * static_cast<size_t>(channels_) + static_cast<size_t>(channel);
     return {&depth_[number * sizeOfTable()], options_.side, options_.radii, views_[of]};
   }
+  /// The part around point number i; parts() where there is none.
+  size_t partAround(size_t i) const;
   /// From point number i to receivers, for each channel. `seen` points to three arrays of to.count values; on return
   /// the second and the third may be the same as the first.
   void look(size_t i, const KernelReceivers& to, float* seen[3]) const;
