@@ -74,7 +74,10 @@ __global__ void seeAndLight(SceneView scene, StubRays rays, VirtualLightsView li
   MarchedEye eye;
   marchEye(scene, rays, camera.ray(0.5f, 0.5f), 0.5f, eye, options.eyeSteps);
   seen[threadIdx.x] = pixelFeatures(eye);
-  out[threadIdx.x] = paths.light(eye, sampler).sum();
+  RandomNumbers numbers{sampler};
+  LayerRadiance radiance;
+  paths.marched().add(eye, radiance, numbers);
+  out[threadIdx.x] = radiance.sum();
 }
 
 /// Receivers of a frame from `i` on.
@@ -83,29 +86,31 @@ __device__ KernelReceivers receiversFrom(const KernelReceivers& all, int i) {
           all.r + i, all.g + i,  all.b + i};
 }
 
-template <EndKind light, EndKind receiver, NearField::Kind near>
+template <EndKind light, EndKind receiver, class Near>
 __device__ void gatherOne(const KernelLight& l, const KernelReceivers& to, const DepthTable& table,
-                          const KernelShadowMap& map, float bound) {
+                          const KernelShadowMap& map, float sigmaT, const Near& near) {
   float seen[3];
-  constexpr float core = NearField::kPlainCore;
-  kernels::seenThroughFog({l.px, l.py, l.pz}, to, bound, &seen[0]);
+  kernels::seenThroughFog({l.px, l.py, l.pz}, to, sigmaT, &seen[0]);
   kernels::seenThroughTable({l.px, l.py, l.pz}, to, table, &seen[0]);
   kernels::seenThroughMap<receiver>(l, to, map, &seen[0]);
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenInArrays{seen, seen, seen}, bound, core);
+  kernels::gather<light, receiver>(l, to, kernels::SeenInArrays{seen, seen, seen}, near);
   using kernels::FogBetween, kernels::TableBetween;
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, FogBetween>{{bound}, map}, bound, core);
-  kernels::gather<light, receiver, near>(l, to, kernels::SeenThrough<receiver, TableBetween>{{table}, map}, bound, core);
+  kernels::gather<light, receiver>(l, to, kernels::SeenThrough<receiver, FogBetween>{{sigmaT}, map}, near);
+  kernels::gather<light, receiver>(l, to, kernels::SeenThrough<receiver, TableBetween>{{table}, map}, near);
 }
 
 /// A receiver each: all lights.
 __global__ void gatherInFrame(View<KernelLight> lights, KernelReceivers receivers, View<DepthTable> tables,
-                              View<KernelShadowMap> maps, float bound) {
+                              View<KernelShadowMap> maps, NearField near) {
   const KernelReceivers to = receiversFrom(receivers, static_cast<int>(threadIdx.x));
-  constexpr auto kClamped = NearField::Kind::clamped, kSpread = NearField::Kind::spread;
+  constexpr auto kLambertian = EndKind::lambertian, kIsotropic = EndKind::isotropic, kHg = EndKind::henyeyGreenstein;
+  const kernels::Clamped clamped{near.bound};
+  const kernels::Spread spread{near.bound, near.core.r};
+  const kernels::SpreadByChannel byChannel{near.bound, near.core};
   for (int i = 0; i < lights.size; ++i) {
-    gatherOne<EndKind::lambertian, EndKind::lambertian, kClamped>(lights[i], to, tables[i], maps[i], bound);
-    gatherOne<EndKind::lambertian, EndKind::henyeyGreenstein, kSpread>(lights[i], to, tables[i], maps[i], bound);
-    gatherOne<EndKind::henyeyGreenstein, EndKind::isotropic, kSpread>(lights[i], to, tables[i], maps[i], bound);
+    gatherOne<kLambertian, kLambertian>(lights[i], to, tables[i], maps[i], near.bound, clamped);
+    gatherOne<kLambertian, kHg>(lights[i], to, tables[i], maps[i], near.bound, spread);
+    gatherOne<kHg, kIsotropic>(lights[i], to, tables[i], maps[i], near.bound, byChannel);
   }
 }
 

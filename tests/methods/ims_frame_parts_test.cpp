@@ -57,31 +57,43 @@ struct TableAround {
   }
 };
 
+/// Of an isotropic light there, at most 1 wide.
+LightBall ballAround(float sigmaT, float end) {
+  const TableAround around(sigmaT, end);
+  return ballWithin({&around.table, 1}, {0, 0, 0, 0, 0, 1, 1, 1, 1, 0}, 1, coreFor(6));
+}
+
 // In a medium without end it is the core that is known; where the medium ends, what lies beyond counts for nothing.
 TEST(FrameLights, BallsKeepTheirLightInTheMedium) {
-  const KernelLight light{0, 0, 0, 0, 0, 1, 1, 1, 1, 0};
   for (const float sigmaT : {0.1f, 2.f, 5.f}) {
-    const LightBall ball = ballWithin(TableAround(sigmaT, 4).table, light, 1, coreFor(6));
+    const LightBall ball = ballAround(sigmaT, 4);
     EXPECT_EQ(ball.radius, 1);
-    EXPECT_NEAR(ball.core / coreFor(sigmaT), 1, 0.05) << sigmaT;
+    EXPECT_NEAR(ball.core.r / coreFor(sigmaT), 1, 0.05) << sigmaT;
   }
   for (const float end : {0.8f, 0.5f}) {
     const float sigmaT = 2;
-    const LightBall ball = ballWithin(TableAround(sigmaT, end).table, light, 1, coreFor(6));
+    const LightBall ball = ballAround(sigmaT, end);
     double spread = 0, point = 0, even = 0;
     const int n = 10000;
     for (int i = 0; i < n; ++i) {
       const float d = end * (static_cast<float>(i) + 0.5f) / n, through = std::exp(-sigmaT * d);
       const float bound = 1 / square(ball.radius);
       point += static_cast<double>(through);
-      spread += static_cast<double>(through * d * d * kernels::spreadFalloff(d * d, bound, ball.core));
+      spread += static_cast<double>(through * d * d * kernels::spreadFalloff(d * d, bound, ball.core.r));
       even += static_cast<double>(through * d * d * kernels::spreadFalloff(d * d, 1, coreFor(sigmaT)));
     }
     EXPECT_NEAR(spread / point, 1, 0.06) << end;
     EXPECT_LT(even / point, end > 0.6f ? 0.98 : 0.9) << end << ": as if the medium had no end";
   }
-  EXPECT_LT(ballWithin(TableAround(2, 0.2f).table, light, 1, coreFor(6)).radius, 0.9f) << "wider than the smoke";
-  EXPECT_LT(ballWithin(TableAround(20, 4).table, light, 1, coreFor(6)).radius, 0.9f) << "too deep";
+  // The densest of three channels says how large the ball is; each has its own core.
+  const TableAround thin(1, 4), middle(2, 4), dense(5, 4);
+  const LightBall ball = ballWithin(std::vector{thin.table, middle.table, dense.table}, {}, 1, coreFor(6));
+  EXPECT_EQ(ball.radius, 1);
+  EXPECT_FLOAT_EQ(ball.core.r, ballAround(1, 4).core.r);
+  EXPECT_FLOAT_EQ(ball.core.b, ballAround(5, 4).core.r);
+  EXPECT_GT(ball.core.b, 1.5f * ball.core.r);
+  EXPECT_LT(ballAround(2, 0.2f).radius, 0.9f) << "wider than the smoke";
+  EXPECT_LT(ballAround(20, 4).radius, 0.9f) << "too deep";
 }
 
 TEST(FrameLights, NeighboursAreThoseOfAllPairs) {

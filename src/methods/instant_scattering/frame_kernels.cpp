@@ -29,17 +29,21 @@ auto seenBy(Kind<kind>, const Between& between, const KernelShadowMap& map) {
   return kernels::SeenThrough<kind, Between>{between, map};
 }
 
+/// body() with what kernels take for lights in grey media.
+template <class Body>
+void withGrey(const NearField& near, const Body& body) {
+  if (near.kind == NearField::Kind::clamped)
+    body(kernels::Clamped{near.bound});
+  else
+    body(kernels::Spread{near.bound, near.core.r});
+}
+
 /// kernels::gather; seenBy(Kind of the receivers) says what is between.
-template <class SeenBy>
-void gather(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, const NearField& near,
+template <class Near, class SeenBy>
+void gather(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind, const Near& near,
             const SeenBy& seenBy) {
   withKind(from, [&](auto f) {
-    withKind(kind, [&](auto k) {
-      if (near.kind == NearField::Kind::clamped)
-        kernels::gather<f.value, k.value, NearField::Kind::clamped>(light, to, seenBy(k), near.bound, near.core);
-      else
-        kernels::gather<f.value, k.value, NearField::Kind::spread>(light, to, seenBy(k), near.bound, near.core);
-    });
+    withKind(kind, [&](auto k) { kernels::gather<f.value, k.value>(light, to, seenBy(k), near); });
   });
 }
 
@@ -47,15 +51,21 @@ void gather(const KernelLight& light, EndKind from, const KernelReceivers& to, E
 
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near) {
-  gather(light, from, to, kind, near, [&](auto) { return kernels::SeenInArrays{seen[0], seen[1], seen[2]}; });
+  const auto seenBy = [&](auto) { return kernels::SeenInArrays{seen[0], seen[1], seen[2]}; };
+  if (near.kind == NearField::Kind::spread && !near.grey())
+    gather(light, from, to, kind, kernels::SpreadByChannel{near.bound, near.core}, seenBy);
+  else
+    withGrey(near, [&](const auto& grey) { gather(light, from, to, kind, grey, seenBy); });
 }
 
 void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                    const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near) {
-  if (table)
-    gather(light, from, to, kind, near, [&](auto k) { return seenBy(k, kernels::TableBetween{*table}, map); });
-  else
-    gather(light, from, to, kind, near, [&](auto k) { return seenBy(k, kernels::FogBetween{sigmaT}, map); });
+  withGrey(near, [&](const auto& grey) {
+    if (table)
+      gather(light, from, to, kind, grey, [&](auto k) { return seenBy(k, kernels::TableBetween{*table}, map); });
+    else
+      gather(light, from, to, kind, grey, [&](auto k) { return seenBy(k, kernels::FogBetween{sigmaT}, map); });
+  });
 }
 
 void lookThroughFog(const KernelPoint& from, const KernelReceivers& to, float sigmaT, float* seen) {

@@ -26,6 +26,11 @@ struct KernelPoint {
   float x, y, z;
 };
 
+/// A value for each channel.
+struct KernelRgb {
+  float r, g, b;
+};
+
 /// Points that are lit, of one kind. Arrays of `count`.
 struct KernelReceivers {
   int count = 0;
@@ -47,8 +52,10 @@ struct NearField {
   static constexpr float kPlainCore = 7;
 
   Kind kind = Kind::clamped;
-  float bound = 1;          ///< [1/unit^2]
-  float core = kPlainCore;  ///< how bright the ball's middle is (spreadFalloff())
+  float bound = 1;                                        ///< [1/unit^2]
+  KernelRgb core = {kPlainCore, kPlainCore, kPlainCore};  ///< how bright the ball's middle is (spreadFalloff())
+
+  bool grey() const { return core.r == core.g && core.r == core.b; }
 };
 
 /// Where a table of optical depths looks from a point: all around or, from outside of the media, into the cone that
@@ -111,16 +118,44 @@ VIRGA_HD static inline float spreadFalloff(float d2, float bound, float core) {
   return t > 0 ? bound * (1 + t * (1 + t * core)) : 1 / d2;
 }
 
+/// The geometry term of a connection, `inverse` over its length: clamped...
+struct Clamped {
+  float bound;
+
+  VIRGA_HD KernelRgb term(float cosines, float, float inverse) const {
+    const float all = std::fmin(cosines * (inverse * inverse), bound);
+    return {all, all, all};
+  }
+};
+/// ...of a light that is spread, by one core for all channels, as in grey media...
+struct Spread {
+  float bound, core;
+
+  VIRGA_HD KernelRgb term(float cosines, float d2, float) const {
+    const float all = cosines * spreadFalloff(d2, bound, core);
+    return {all, all, all};
+  }
+};
+/// ...or by one for each.
+struct SpreadByChannel {
+  float bound;
+  KernelRgb core;
+
+  VIRGA_HD KernelRgb term(float cosines, float d2, float) const {
+    return {cosines * spreadFalloff(d2, bound, core.r), cosines * spreadFalloff(d2, bound, core.g),
+            cosines * spreadFalloff(d2, bound, core.b)};
+  }
+};
+
 /// Light at a receiver from the light at (x, y, z) from it, `inverse` over that distance: over the light's weight and
-/// what lies between them. `cr`: cosine at the receiver.
-template <EndKind light, EndKind receiver, NearField::Kind near>
-VIRGA_HD static inline float connected(const KernelLight& l, float x, float y, float z, float d2, float inverse,
-                                       float cr, float anisotropy, float bound, float core) {
+/// what lies between them. `cr`: cosine at the receiver. `near`: Clamped, Spread or SpreadByChannel.
+template <EndKind light, EndKind receiver, class Near>
+VIRGA_HD static inline KernelRgb connected(const KernelLight& l, float x, float y, float z, float d2, float inverse,
+                                           float cr, float anisotropy, const Near& near) {
   const float cl = -(l.ax * x + l.ay * y + l.az * z) * inverse;
-  const float cosines = endCosine<light>(cl) * endCosine<receiver>(cr);
-  const float term = near == NearField::Kind::clamped ? std::fmin(cosines * (inverse * inverse), bound)
-                                                      : cosines * spreadFalloff(d2, bound, core);
-  return term * endScattering<light>(cl, l.anisotropy) * endScattering<receiver>(cr, anisotropy);
+  const KernelRgb term = near.term(endCosine<light>(cl) * endCosine<receiver>(cr), d2, inverse);
+  const float scattering = endScattering<light>(cl, l.anisotropy) * endScattering<receiver>(cr, anisotropy);
+  return {term.r * scattering, term.g * scattering, term.b * scattering};
 }
 
 /// Transmittance from a point through a homogeneous medium that is everywhere.
@@ -212,15 +247,11 @@ VIRGA_HD static inline void seenThroughTable(const KernelPoint& l, const KernelR
   }
 }
 
-/// What is seen of a receiver, channel by channel: transmittance times visibility.
-struct Seen {
-  float r, g, b;
-};
-/// As arrays say...
+/// What is seen of a receiver, transmittance times visibility: as arrays say...
 struct SeenInArrays {
   const float *r, *g, *b;
 
-  VIRGA_HD Seen at(int i, float, float, float, float, float, float) const { return {r[i], g[i], b[i]}; }
+  VIRGA_HD KernelRgb at(int i, float, float, float, float, float, float) const { return {r[i], g[i], b[i]}; }
 };
 /// ...or through grey media and the light's shadow map, by the way (x, y, z) to the receiver, `inverse` over its
 /// length, and the cosine there. Most frames spend their time here.
@@ -229,7 +260,7 @@ struct SeenThrough {
   Between between;
   KernelShadowMap map;
 
-  VIRGA_HD Seen at(int, float x, float y, float z, float distance, float inverse, float cr) const {
+  VIRGA_HD KernelRgb at(int, float x, float y, float z, float distance, float inverse, float cr) const {
     const bool seen = reaches<receiver>(map, depthToward(map, x, y, z + 1e-10f), distance, cr);
     const float through = falling(between.depth(x, y, z + 1e-10f, distance, inverse));
     const float all = seen ? through : 0.f;
@@ -253,9 +284,9 @@ struct TableBetween {
 };
 
 /// One light, all receivers. `between`: SeenInArrays or SeenThrough.
-template <EndKind light, EndKind receiver, NearField::Kind near, class Between>
-VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const Between between, float bound,
-                                   float core) {
+template <EndKind light, EndKind receiver, class Between, class Near>
+VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& to, const Between between,
+                                   const Near near) {
   const float* __restrict px = to.px;
   const float* __restrict py = to.py;
   const float* __restrict pz = to.pz;
@@ -269,11 +300,11 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
     const float inverse = 1 / std::sqrt(d2);
     const float cr = (to.ax[i] * x + to.ay[i] * y + to.az[i] * z) * inverse;
     const float anisotropy = receiver == EndKind::henyeyGreenstein ? to.anisotropy[i] : 0;
-    const float value = connected<light, receiver, near>(l, x, y, z, d2, inverse, cr, anisotropy, bound, core);
-    const Seen seen = between.at(i, -x, -y, -z, d2 * inverse, inverse, cr);
-    r[i] += value * seen.r * l.r;
-    g[i] += value * seen.g * l.g;
-    b[i] += value * seen.b * l.b;
+    const KernelRgb value = connected<light, receiver>(l, x, y, z, d2, inverse, cr, anisotropy, near);
+    const KernelRgb seen = between.at(i, -x, -y, -z, d2 * inverse, inverse, cr);
+    r[i] += value.r * seen.r * l.r;
+    g[i] += value.g * seen.g * l.g;
+    b[i] += value.b * seen.b * l.b;
   }
 }
 
@@ -285,7 +316,7 @@ VIRGA_HD static inline void gather(const KernelLight& l, const KernelReceivers& 
 void gatherLight(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                  const float* const seen[3], const NearField& near);
 /// gatherLight() through the light's shadow map and what its table knows or, without one, a fog of sigmaT [1/unit] that
-/// is everywhere.
+/// is everywhere. All is grey: of `near` the core of red holds for all channels.
 void gatherThrough(const KernelLight& light, EndKind from, const KernelReceivers& to, EndKind kind,
                    const DepthTable* table, float sigmaT, const KernelShadowMap& map, const NearField& near);
 /// exp(-sigmaT d) for each receiver.

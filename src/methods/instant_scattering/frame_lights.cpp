@@ -17,8 +17,8 @@ Vec3 aside(const FrameLights::Light& light, const SceneView& view) {
 
 FrameLights::Light lightOf(const SceneView& view, const LightVertex& v, int walks) {
   const bool onSurface = v.kind == VertexKind::surface;
-  FrameLights::Light light{{}, EndKind::lambertian,   &v,           1 / static_cast<float>(walks),
-                           0,  NearField::kPlainCore, v.surface < 0};
+  FrameLights::Light light{{}, EndKind::lambertian, &v,           1 / static_cast<float>(walks),
+                           0,  NearField().core,    v.surface < 0};
   float g = 0;
   if (!onSurface) light.plain = plainPhase(view.media[v.medium].phaseAt(v.p), light.kind, g);
   const Vec3 axis = onSurface ? v.normal : v.wi;
@@ -82,6 +82,27 @@ std::vector<FrameLights::Light> chosenOf(const OfKind& all, LightChoice& choice,
   return chosen;
 }
 
+/// Extinction of all media at the place of a light in one of them [1/unit].
+Rgb sigmaTAround(const Scene& scene, int endless, const LightVertex& v) {
+  const SceneView& view = scene.view;
+  const Rgb own = view.media[v.medium].sigmaTAt(v.p);
+  if (view.media.size == 1 && view.boundaries.size <= 1) return own;
+  const MediaState media = mediaAt(scene, v.p, endless);
+  Rgb sum;
+  for (int i = 0; i < media.count(); ++i) sum += view.media[media.medium(i)].sigmaTAt(v.p);
+  return isBlack(sum) ? own : sum;  // at the very border of its medium
+}
+
+constexpr float kDeepest = 6;  // measured: docs/decisions/ims-frame-balls.md
+
+/// NearField::core of a light in media, by their optical depth within its radius.
+KernelRgb coresFor(Rgb depth) {
+  const auto core = [](float d) { return coreFor(std::min(kDeepest, d)); };
+  const float red = core(depth.r);
+  if (depth.r == depth.g && depth.r == depth.b) return {red, red, red};
+  return {red, core(depth.g), core(depth.b)};
+}
+
 /// Radii of the lights of one kind, by how they lie.
 void spread(std::span<FrameLights::Light> lights, VertexKind kind, float otherwise) {
   // Measured: docs/decisions/ims-frame-balls.md.
@@ -94,21 +115,23 @@ void spread(std::span<FrameLights::Light> lights, VertexKind kind, float otherwi
   for (size_t i = 0; i < lights.size(); ++i) lights[i].radius = radii[i] > 0 ? radii[i] : otherwise;
 }
 
-/// Fits a light's ball to the medium that it lies in: point number i of `between`.
-void fitToMedium(const SceneView& view, const MediaBetween& between, size_t i, FrameLights::Light& light) {
-  constexpr float kDeepest = 6;
-  static const float kMostCore = coreFor(kDeepest);
+/// Fits a light's ball to the media that it lies in: point number i of `between`.
+void fitToMedia(const Scene& scene, int endless, const MediaBetween& between, size_t i, FrameLights::Light& light) {
   const LightVertex& v = *light.vertex;
-  const Rgb sigmaT = view.media[v.medium].sigmaTAt(v.p);
   const size_t part = between.partAround(i);
-  // In fog the ball is often as wide as the room, and what is put back at walls would light its middle, which is seen.
-  if (part == between.parts() || view.media[v.medium].homogeneous) {
-    light.core = coreFor(std::min(kDeepest, light.radius * maxComponent(sigmaT)));
+  const Rgb depth = sigmaTAround(scene, endless, v) * light.radius;
+  // In thin fog it is often as wide as the room, and what is put back at walls would light its middle, which is seen.
+  constexpr float kThin = 2;
+  const bool thinFog = scene.view.media[v.medium].homogeneous && maxComponent(depth) < kThin;
+  if (part == between.parts() || thinFog) {
+    light.core = coresFor(depth);
     return;
   }
-  const float most = maxComponent(sigmaT);
-  const int channel = between.grey() || sigmaT.r == most ? 0 : sigmaT.g == most ? 1 : 2;
-  const LightBall ball = ballWithin(between.table(i, part, channel), light.kernel, light.radius, kMostCore);
+  static const float kMostCore = coreFor(kDeepest);
+  const DepthTable tables[3] = {between.table(i, part, 0), between.table(i, part, between.grey() ? 0 : 1),
+                                between.table(i, part, between.grey() ? 0 : 2)};
+  const LightBall ball =
+      ballWithin(std::span(tables).first(between.grey() ? 1 : 3), light.kernel, light.radius, kMostCore);
   light.radius = ball.radius, light.core = ball.core;
 }
 
@@ -153,9 +176,10 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   for (const Light& l : lights_) places.push_back(aside(l, view));
   between_ = MediaBetween(scene, std::move(places), {}, stop);
   if (!options.balls || stop.stop_requested()) return;
+  const int endless = endlessMedium(scene);
   parallelFor(static_cast<int64_t>(lights_.size() - onSurface), 16, [&](int64_t n) {
     const size_t i = onSurface + static_cast<size_t>(n);
-    fitToMedium(view, between_, i, lights_[i]);
+    fitToMedia(scene, endless, between_, i, lights_[i]);
   });
 }
 

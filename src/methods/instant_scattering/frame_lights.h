@@ -35,7 +35,7 @@ class FrameLights {
     const LightVertex* vertex;  ///< in virtualLights()
     float share;                ///< by which the vertex's weight counts
     float radius;               ///< of the ball that it is spread over, where the user gives none [unit]
-    float core;                 ///< NearField::core for that
+    KernelRgb core;             ///< NearField::core for that
     bool plain;  ///< the kernels know its bsdf or phase function; of others the kernel's light says only where they are
   };
 

@@ -175,17 +175,20 @@ class DepthsAround {
 
 }  // namespace
 
-LightBall ballWithin(const DepthTable& media, const KernelLight& light, float radius, float mostCore) {
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore) {
   constexpr int kMostTries = 6;
   constexpr float kSmaller = 0.85f;
-  const DepthsAround depths(media, light);
-  LightBall ball{radius, mostCore};
-  for (int n = 0; n < kMostTries; ++n) {
-    if (n > 0) ball.radius *= kSmaller;
-    const float core = depths.within(ball.radius).neededCore();
-    if (core <= mostCore) return {ball.radius, core};
+  std::vector<DepthsAround> channels;
+  for (const DepthTable& table : media) channels.emplace_back(table, light);
+  for (int n = 0;; ++n, radius *= kSmaller) {
+    float core[3], most = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      core[c] = c < channels.size() ? channels[c].within(radius).neededCore() : core[0];
+      most = std::max(most, core[c]);
+    }
+    if (most > mostCore && n + 1 < kMostTries) continue;
+    return {radius, {std::min(core[0], mostCore), std::min(core[1], mostCore), std::min(core[2], mostCore)}};
   }
-  return ball;
 }
 
 float coreFor(float depth) {

@@ -26,13 +26,14 @@ float coreFor(float depth);
 
 /// A light's ball: its radius [unit] and NearField::core.
 struct LightBall {
-  float radius, core;
+  float radius;
+  KernelRgb core;
 };
 
 /// The ball of a light in a medium, at most as wide as `radius`, that sends as much light to the media within it as its
 /// middle would. A ball that would have to be brighter in its middle than `mostCore` for that, because it is wider than
 /// the smoke that it lies in or many mean free paths deep, is made smaller. `media`: optical depths all around the
-/// light (DepthView::stretch is 1). The light's own directions are those of its g.
-LightBall ballWithin(const DepthTable& media, const KernelLight& light, float radius, float mostCore);
+/// light (DepthView::stretch is 1), of each channel or one for all. The light's own directions are those of its g.
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore);
 
 }  // namespace virga

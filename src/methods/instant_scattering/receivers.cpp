@@ -113,12 +113,13 @@ void ReceiverBatch::gatherSlowly(const FrameLights& lights, size_t i, const Scen
     if (!(d2 > 0)) continue;
     const Vec3 w = way / std::sqrt(d2);
     const float cosine = generalCosine(vertex.normal, w), receiving = generalCosine(x.normal(), w);
-    const float term = near.kind == NearField::Kind::spread
-                           ? cosine * kernels::spreadFalloff(d2, near.bound, near.core)
-                           : cosine / d2 * (1 - clampedShareOf(cosine * receiving / d2, near.bound));
+    const auto spread = [&](float core) { return kernels::spreadFalloff(d2, near.bound, core); };
+    const Rgb term = near.kind == NearField::Kind::spread
+                         ? Rgb(spread(near.core.r), spread(near.core.g), spread(near.core.b))
+                         : Rgb((1 - clampedShareOf(cosine * receiving / d2, near.bound)) / d2);
     // What plain receivers scatter apart from direction is in their throughput.
     const Rgb scattered = group.plain ? Rgb(plainScattering(group, n, w)) : x.scattering(w);
-    const Rgb value = scattered * intensity(all, scene, vertex, -w) * (term * from.share);
+    const Rgb value = scattered * intensity(all, scene, vertex, -w) * term * (cosine * from.share);
     for (int c = 0; c < 3; ++c) group.sum[c][n] += value[c] * seen[c][n];
   }
 }
