@@ -156,7 +156,7 @@ TEST(ImsSequence, FramesOfSmokeThatMovesIntoEmptySpace) {
   expectFramesAgree({"frame, moving", moving(), "0", few, kFrame}, 4);
 }
 TEST(ImsSequence, FramesOfWhichAQuarterIsTracedAnew) {
-  expectFramesAgree({"frame, a quarter", creeping(), "0.25", kFramePowers, kFrame, Layer::mediaToSurface}, 3);
+  expectFramesAgree({"frame, a quarter", creeping(), "0.25", kFramePowers, kFrame, Layer::mediaToSurface}, 5);
 }
 
 /// A ball of smoke that moves by a seventh of its radius, above a flat floor: declared by the sensor, or in a cube.
