@@ -29,11 +29,14 @@ SettingsReader::SettingsReader(const Settings& settings, std::span<const Setting
                   {{}, didYouMean(name, names), {"available: " + joined(names)}});
 }
 
-std::optional<int> SettingsReader::integer(std::string_view name, int lowest) const {
+std::optional<int> SettingsReader::integer(std::string_view name, int lowest, int highest,
+                                           std::string_view remedy) const {
   const std::string* text = find(name);
   if (!text) return {};
   int value = 0;
   const auto [end, error] = std::from_chars(text->data(), text->data() + text->size(), value);
+  const bool large = error == std::errc::result_out_of_range || value > highest;
+  if (large && text->front() != '-') fail(name, fmt::format("an integer from {} to {}", lowest, highest), remedy);
   if (error != std::errc() || end != text->data() + text->size() || value < lowest)
     fail(name, fmt::format("an integer of at least {}", lowest));
   return value;
@@ -43,7 +46,8 @@ std::optional<float> SettingsReader::number(std::string_view name, float above) 
   const std::string* text = find(name);
   if (!text) return {};
   const std::optional<float> value = finite(*text);
-  if (!value || !(*value > above)) fail(name, fmt::format("a number above {}", above));
+  if (!value || !(*value > above))
+    fail(name, fmt::format("a number above {} and up to {:.1e}", above, std::numeric_limits<float>::max()));
   return value;
 }
 
@@ -76,8 +80,9 @@ const std::string* SettingsReader::find(std::string_view name) const {
   return it == settings_.values.end() ? nullptr : &it->second;
 }
 
-void SettingsReader::fail(std::string_view name, std::string_view expected) const {
-  throw Error(fmt::format("--set {}.{}: \"{}\" is not {}", method_, name, *find(name), expected));
+void SettingsReader::fail(std::string_view name, std::string_view expected, std::string_view remedy) const {
+  throw Error(fmt::format("--set {}.{}: \"{}\" is not {}", method_, name, *find(name), expected),
+              {{}, std::string(remedy), {}});
 }
 
 }  // namespace virga

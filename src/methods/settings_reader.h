@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -16,7 +17,8 @@ class SettingsReader {
   SettingsReader(const Settings& settings, std::span<const SettingInfo> known, std::string_view method);
 
   /// Empty where the setting was not given.
-  std::optional<int> integer(std::string_view name, int lowest) const;
+  std::optional<int> integer(std::string_view name, int lowest, int highest = std::numeric_limits<int>::max(),
+                             std::string_view remedy = "") const;
   /// Finite and above `above`.
   std::optional<float> number(std::string_view name, float above) const;
   /// From 0 to 1, both included.
@@ -27,7 +29,7 @@ class SettingsReader {
 
  private:
   const std::string* find(std::string_view name) const;
-  [[noreturn]] void fail(std::string_view name, std::string_view expected) const;
+  [[noreturn]] void fail(std::string_view name, std::string_view expected, std::string_view remedy = "") const;
 
   const Settings& settings_;
   std::string_view method_;

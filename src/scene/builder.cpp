@@ -84,14 +84,15 @@ void warnOfDarkness(BuildContext& context) {
     context.diagnostics.warnings.push_back("warning: nothing in the scene shines: its picture is black");
   const bool points =
       std::any_of(parts.emitters.begin(), parts.emitters.end(), [](const EmitterView& e) { return e.isDelta(); });
-  const bool glass = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
-    const Bsdf& front = parts.bsdfs[static_cast<size_t>(s.bsdf)].front;
-    return front.specular() && front.transmits() && !front.isThin();
+  const bool mirrors = std::any_of(parts.surfaces.begin(), parts.surfaces.end(), [&](const ShapeView& s) {
+    const SurfaceBsdf& bsdf = parts.bsdfs[static_cast<size_t>(s.bsdf)];
+    return bsdf.front.specular() || bsdf.back.specular();
   });
-  if (points && glass)
+  if (points && mirrors)
     context.diagnostics.warnings.push_back(
-        "warning: light of point, spot and directional emitters through smooth glass cannot be found by path: "
-        "caustic_* layers lack it; give such lamps a small area");
+        "warning: light of point, spot and directional emitters that smooth conductors, dielectrics and "
+        "thindielectrics mirror or refract is missing: in path from the caustic_*, surface_to_* and media_to_* layers, "
+        "in ims from caustic_* and in part from the others; give such lamps a small area");
 }
 
 // The eye may stand exactly on a boundary. Whether it is inside is asked a little beside it, and each camera ray

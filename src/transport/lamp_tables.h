@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <stop_token>
 #include <vector>
 
@@ -25,9 +26,6 @@ struct LampTable {
   /// Of the node at a place in [-1, 1]^2, in the world.
   VIRGA_HD Vec3 direction(Vec2 q) const {
     return frame.toWorld(reach > 0 ? normalize(Vec3(q.x * reach, q.y * reach, 1)) : fromOctahedron(q));
-  }
-  VIRGA_HD float radius(int m) const {
-    return first + (last - first) * (static_cast<float>(m) / static_cast<float>(radii - 1));
   }
 
   /// Optical depth between the lamp and x.
@@ -84,7 +82,8 @@ class LampTables {
   static constexpr size_t kMostBytes = size_t{1} << 30;
 
   LampTables() = default;
-  /// `side`: nodes of each table in either direction, and half as many radii. A stop leaves zeros.
+  /// `side`: nodes of each table in either direction. Half as many radii, but where `side` is 96 or more at least 96.
+  /// A stop leaves zeros.
   LampTables(const Scene& scene, int side, const std::stop_token& stop);
 
   /// One for each emitter, or none at all. Points into this object.
@@ -92,16 +91,17 @@ class LampTables {
 
  private:
   std::vector<LampTable> tables_;
-  std::vector<std::vector<float>> depths_;
+  std::vector<std::unique_ptr<float[]>> depths_;  ///< not cleared: the threads that fill them touch them first
 };
 
 /// Are all media grids that end by themselves, and is there a point or spot lamp, but not too many?
 bool mayHaveLampTables(const SceneView& scene);
 /// Nodes in either direction that do justice to each of the scene's grids: one and a half for each of its voxels, but
 /// at least 32 and at most 256 of them across it, and the more of them the less of all media it is. However many these
-/// are. 0 where there can be no tables.
+/// are, but 96 at least and, up to 192, so many that they are as close where the media end, as seen from the lamps.
+/// 0 where there can be no tables.
 float wantedLampTableSide(const Scene& scene);
-/// The same, if half as many are within 256 and 128 MB; otherwise 0: where small grids lie far apart marching is
+/// The same, if half as many are within 256 and 160 MB; otherwise 0: where small grids lie far apart marching is
 /// better.
 int lampTableSide(const Scene& scene);
 /// What tables of that side take [bytes].

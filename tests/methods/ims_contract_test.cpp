@@ -229,6 +229,12 @@ TEST(ImsSettings, WhatMakesNoSenseIsRefused) {
     EXPECT_TRUE(messageOf(scene, settings).starts_with(message)) << messageOf(scene, settings);
   };
   refused({{"walks", "0"}}, "error: --set ims.walks: \"0\" is not an integer of at least 1");
+  for (const std::string many : {"4194305", "99999999999"})
+    refused({{"walks", many}},
+            ("error: --set ims.walks: \"" + many + "\" is not an integer from 1 to 4194304").c_str());
+  refused({{"walks", "-99999999999"}}, "error: --set ims.walks: \"-99999999999\" is not an integer of at least 1");
+  refused({{"lights", "99999999999"}},
+          "error: --set ims.lights: \"99999999999\" is not an integer from 1 to 2147483647");
   refused({{"lights", "0"}}, "error: --set ims.lights: \"0\" is not an integer of at least 1");
   refused({{"paths", "-1"}}, "error: --set ims.paths: \"-1\" is not an integer of at least 0");
   refused({{"v1", "0"}}, "error: --set ims.v1: \"0\" is not an integer of at least 1");
@@ -236,6 +242,7 @@ TEST(ImsSettings, WhatMakesNoSenseIsRefused) {
   for (const char* number : {"0", "-1", "nan", "inf", "near"}) {
     refused({{"radius", number}}, "error: --set ims.radius: ");
     refused({{"bound", number}}, "error: --set ims.bound: ");
+    EXPECT_TRUE(messageOf(scene, {{"bound", number}}).find("a number above 0 and up to 3.4e+38") != std::string::npos);
   }
   refused({{"radius", "1"}, {"bound", "1"}}, "error: --set ims.radius and ims.bound say the same");
   refused({{"show", "compensation"}}, "error: --set ims.show=compensation needs ims.compensation=sampled");

@@ -300,11 +300,28 @@ TEST(Builder, BrokenVolumesAreBlamedOnTheirPlaceInTheScene) {
 TEST(Builder, WhatMakesAPictureBlackIsWarnedOf) {
   EXPECT_EQ(test::build("<shape type=\"sphere\"/>")->warnings,
             std::vector<std::string>{"warning: nothing in the scene shines: its picture is black"});
-  EXPECT_EQ(test::build("<emitter type=\"point\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")
-                ->warnings.size(),
-            1u);
-  EXPECT_TRUE(test::build("<emitter type=\"constant\"/><shape type=\"sphere\"><bsdf type=\"dielectric\"/></shape>")
-                  ->warnings.empty());
+}
+
+TEST(Builder, LampsWhoseLightMirrorsAndGlassThrowUnseenAreWarnedOf) {
+  const auto warnings = [](const std::string& emitter, const std::string& bsdf) {
+    return test::build("<emitter type=\"" + emitter + "\"/><shape type=\"sphere\"><bsdf type=" + bsdf +
+                       "/bsdf></shape>")
+        ->warnings;
+  };
+  const std::string mirror = R"("conductor"><)", glass = R"("dielectric"><)", pane = R"("thindielectric"><)",
+                    twoSided = R"("twosided"><bsdf type="conductor"/><)",
+                    behind = R"("twosided"><bsdf type="diffuse"/><bsdf type="conductor"/><)";
+  for (const std::string& bsdf : {mirror, glass, pane, twoSided, behind}) {
+    for (const char* lamp : {"point", "spot", "directional"}) {
+      const std::vector<std::string> found = warnings(lamp, bsdf);
+      ASSERT_EQ(found.size(), 1u) << lamp << bsdf;
+      for (const char* word : {"mirror", "path", "ims", "caustic_*", "surface_to_*", "media_to_*", "small area"})
+        EXPECT_NE(found[0].find(word), std::string::npos) << word;
+    }
+    EXPECT_TRUE(warnings("constant", bsdf).empty()) << bsdf;
+  }
+  for (const char* bsdf : {R"("diffuse"><)", R"("roughconductor"><float name="alpha" value="0"/><)"})
+    EXPECT_TRUE(warnings("point", bsdf).empty()) << bsdf;
 }
 
 TEST(Builder, ObjectsThatAreOnlyReferredToMayStandAnywhere) {

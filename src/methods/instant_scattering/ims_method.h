@@ -14,7 +14,7 @@ inline constexpr SettingInfo kImsSettings[] = {
      "sees a mirror or glass"},
     {"spacing", "8", "fast, frame: their distance in either direction [pixels]"},
     {"eye_steps", "64; frame: 128", "fast, frame: steps of an eye ray through each stretch of media, at most 128"},
-    {"lamp_table", "0; 1.5 for each voxel where media are grids, 32 to 256",
+    {"lamp_table", "0; 1.5 for each voxel where media are grids, 96 to 256",
      "fast: what media let through from point and spot lamps (at most 8) is looked up in tables of so many nodes in "
      "either direction, where all media are grids with nothing around them; 0: it is marched from each point"},
     {"walks", "8192; 256 with shadow maps; frame: 16384", "random walks from the lights in each pass"},

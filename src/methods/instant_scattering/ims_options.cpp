@@ -119,10 +119,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
   o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
   readMarching(reader);
-  walks_ = reader.integer("walks", 1);
-  if (walks_ && *walks_ > kMostWalks)
-    throw Error(fmt::format("--set ims.walks may be at most {}", kMostWalks),
-                {{}, "ask for more passes instead: each has walks of its own", {}});
+  walks_ = reader.integer("walks", 1, kMostWalks, "ask for more passes instead: each has walks of its own");
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));
   o.aim = reader.share("aim").value_or(o.mode == ImsOptions::Mode::frame ? kFrameAim : 0);
   if (o.aim > kMostAim)
