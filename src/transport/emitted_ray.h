@@ -79,7 +79,8 @@ VIRGA_HD inline EmittedRay fromInfinity(const Bounds& reach, Vec3 travel, Rgb ir
   float density = aimed.rest / (kPi * square(radius));
   for (int i = 0; i < aimed.count; ++i) {
     const AimedPart& disk = aimed.parts[i];
-    if (distance(place, disk.axis) < disk.width) density += disk.share / (kPi * square(disk.width));
+    // One aimed at the rim may be off it by rounding.
+    if (i == part || distance(place, disk.axis) < disk.width) density += disk.share / (kPi * square(disk.width));
   }
   return {{center + place - travel * radius, travel}, irradiance / density};
 }

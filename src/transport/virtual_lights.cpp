@@ -128,11 +128,14 @@ WalkStarts::Start WalkStarts::sample(Sampler& sampler) const {
   return start;
 }
 
+int mediumWithoutEnd(const Scene& scene) {
+  const int around = endlessMedium(scene);
+  return around != MediaState::kNone && endsByItself(scene.view.media[around]) ? MediaState::kNone : around;
+}
+
 EmissionTargets mediaTargets(const Scene& scene, float share) {
   if (!(share > 0)) return {};
-  const int around = endlessMedium(scene);
-  const bool endless = around != MediaState::kNone && !endsByItself(scene.view.media[around]);
-  const std::vector<Bounds> boxes = boxesOfMedia(scene, EmissionTargets::kMost, endless ? around : MediaState::kNone);
+  const std::vector<Bounds> boxes = boxesOfMedia(scene, EmissionTargets::kMost, mediumWithoutEnd(scene));
   EmissionTargets targets;
   for (const Bounds& box : boxes)
     if (const float radius = 0.5f * length(box.extent()); radius > 0)

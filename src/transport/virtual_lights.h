@@ -40,9 +40,11 @@ VirtualLights traceVirtualLights(const Scene& scene, const WalkOptions& options,
 /// Index of the medium that is around everything: one that the sensor declares and in whose shape it does not lie;
 /// MediaState::kNone where there is none.
 int endlessMedium(const Scene& scene);
+/// The same, unless it ends by itself.
+int mediumWithoutEnd(const Scene& scene);
 
-/// Spheres around the parts of the media that lie apart, at which a share of the walks is aimed; none where the sensor
-/// declares a medium that has no end. They do not depend on the camera, which may move among the lights.
+/// Spheres around the parts of the media that lie apart, at which a share of the walks is aimed; a medium without end
+/// is no such part. They do not depend on the camera, which may move among the lights.
 EmissionTargets mediaTargets(const Scene& scene, float share);
 
 /// Where walks start: rays from lights that are chosen by power. The scene must outlive it.

@@ -130,6 +130,8 @@ TEST(ImsContract, ACropWindowIsPartOfThePicture) {
   EXPECT_LE(differingInCrop(kVariants[1], 0), 3);
   for (const char* mode : {"fast", "frame"})
     EXPECT_LE(differingInCrop({{"walks", "200"}, {"mode", mode}, {"spacing", "2"}}, 4), 3) << mode;
+  const SettingValues sampled{{"walks", "200"}, {"mode", "frame"}, {"spacing", "2"}, {"compensation", "sampled"}};
+  EXPECT_LE(differingInCrop(sampled, 4), 3);
 }
 
 TEST(ImsContract, AnEditedSceneRendersAsIfItWereNew) {

@@ -80,15 +80,26 @@ TEST(ImsFrame, NothingPopsInFogWhenTheCameraMoves) {
   expectCoherent(fog(64), fog(64, R"(<bsdf type="diffuse"/>)", 0.002f));
 }
 
-TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
-  const Settings settings{{{"mode", "frame"}, {"walks", "500"}}, 1};
-  RenderSession moved(sceneOf(fog(24)), findMethod("ims"), {.settings = settings});
+/// A frame after the camera has moved is the one that starts there.
+void expectLightsStay(const std::string& before, const std::string& after) {
+  const Settings settings{{{"mode", "frame"}, {"walks", "500"}, {"lights", "50"}}, 1};
+  RenderSession moved(sceneOf(before), findMethod("ims"), {.settings = settings});
   moved.step();
-  moved.edit(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), {{{{"camera"}, Aspect::camera}}});
+  moved.edit(sceneOf(after), {{{{"camera"}, Aspect::camera}}});
   moved.step();
-  RenderSession fresh(sceneOf(fog(24, R"(<bsdf type="diffuse"/>)", 0.3f)), findMethod("ims"), {.settings = settings});
+  RenderSession fresh(sceneOf(after), findMethod("ims"), {.settings = settings});
   fresh.step();
   EXPECT_EQ(largestDifference(moved.film().beauty(), fresh.film().beauty()), 0);
+}
+TEST(ImsFrame, LightsStayWhenTheCameraMoves) {
+  expectLightsStay(fog(24), fog(24, R"(<bsdf type="diffuse"/>)", 0.3f));
+  // Without shapes there is nothing but the camera to tell where the scene is.
+  const auto from = [](const std::string& place) {
+    return R"(<medium type="homogeneous" id="fog"><float name="sigma_t" value="0.3"/></medium>)" +
+           pinpointSensor(place, "0, 0, 0", "0, 1, 0", 8, R"(<ref name="medium" id="fog"/>)") +
+           R"(<emitter type="point"><point name="position" value="0, 1, 0"/></emitter>)";
+  };
+  expectLightsStay(from("0, 0, 4"), from("0, 0, 9"));
 }
 
 // Lights and tables are kept when the camera alone moves: they must not depend on the media around it.

@@ -361,5 +361,26 @@ TEST(EmittedRay, LeavesItsLightBehind) {
   }
 }
 
+// Few of a sun's rays meet a small target by themselves, and those weigh a million times as much: none that was aimed
+// at its rim may be taken for one of them.
+TEST(EmittedRay, AimedAtTheRimOfASmallTarget) {
+  const SceneSnapshot scene = test::build(R"(<emitter type="directional">
+    <vector name="direction" x="0.3" y="0.2" z="-1"/><rgb name="irradiance" value="2"/></emitter>)" +
+                                          std::string(kPatch));
+  const Bounds reach{Vec3(-1000), Vec3(1000)};
+  EmissionTargets targets;
+  targets.add({Vec3(3, 1, 2), 1, 0.5f});
+  Pcg32 random(1);
+  double flux = 0;
+  constexpr int kRays = 2'000'000;
+  for (int i = 0; i < kRays; ++i) {
+    const Vec2 position{random.next(), random.next()};
+    const EmittedRay r = sampleEmittedRay(scene->view, scene->view.emitters[0], reach, position, {}, targets);
+    const Vec3 way = targets.spheres[0].center - r.ray.o;
+    if (length(cross(way, r.ray.d)) < 1.001f) flux += static_cast<double>(r.flux.g);
+  }
+  EXPECT_NEAR(flux / kRays / (2 * kPiDouble), 1, 0.01);
+}
+
 }  // namespace
 }  // namespace virga

@@ -29,7 +29,7 @@ class EyeBlock {
   std::array<LayerRadiance, kSize> radiance;  ///< room for what is found of each
 
   /// Marches the ray startOf(pixel) of each pixel, by so many steps through each stretch of media. `packs`: smoke may
-  /// be left to smoke(): then it is not in the steps of an eye, but its first medium and in its optical depth.
+  /// be left to smoke(): then it is in no step of an eye, but is its first medium and in its optical depth.
   template <class StartOf>
   void look(const SceneView& scene, const EmbreeRays& rays, int steps, bool packs, const StartOf& startOf) {
     std::array<EyeStart, kSize> starts;

@@ -7,7 +7,7 @@
 
 namespace virga {
 
-// Neighbouring eye rays of a frame, each through one stretch of the same grid, are marched side by side: plain loops
+// Neighbouring eye rays, each through one stretch of the same grid, are marched side by side: plain loops
 // over arrays, as in frame_kernels.h, and compiled likewise.
 
 /// Values on a box of voxels, x fastest; fewer than 2^31 of them.

@@ -153,7 +153,7 @@ void FastRenderer::pass(const Scene& scene, const ImsPixels& pixels, const ImsOp
   // The first pass looks at the middles of pixels: one march for what a pixel shows and for its light.
   const bool atMiddles = id.replicate == 0 && id.index == 0 && pixels.marches();
   const size_t all = static_cast<size_t>(frame.width()) * static_cast<size_t>(frame.height());
-  if (features_.size() != all) features_ = LargeArray<PixelFeatures>(all);
+  if (features_.size() != all) features_ = LargeArray<PixelFeatures>(all), known_ = false;
   const std::span features(features_.data(), all);
   if (atMiddles)
     own.lookAndLight(features);

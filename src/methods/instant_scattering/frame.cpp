@@ -133,6 +133,7 @@ bool FrameRenderer::prepareLights(const Scene& scene, const ImsOptions& options,
   FrameLights::Options kept;
   kept.most = options.frameLights;
   kept.balls = !(options.frame.near.bound > 0);
+  kept.fitted = options.frame.near.kind == NearField::Kind::spread;
   kept.radius = options.compensation.radius;
   kept.turn = FixedNumbers{id.index}.shift();
   if (options.frame.visibility != ReceiverBatch::Visibility::maps) kept.shadows = FrameLights::ShadowMapping::none;

@@ -40,11 +40,13 @@ struct OfKind {
 /// leave lights far out, which hardly shine on anything.
 class Nearness {
  public:
-  explicit Nearness(const Scene& scene) : near_(scene.view.bounds) {
-    for (const EmitterView& e : scene.view.emitters)
+  explicit Nearness(const Scene& scene) {
+    const SceneView& view = scene.view;
+    if (view.surfaces.size + view.boundaries.size > 0) near_ = view.bounds;  // otherwise these are the camera's place
+    for (const EmitterView& e : view.emitters)
       if (e.isLocal() && e.isDelta()) near_.extend(e.position);
-    for (const Bounds& box : boxesOfMedia(scene, 1, endlessMedium(scene))) near_.extend(box);
-    radius2_ = lengthSquared(near_.extent()) / 4;
+    for (const Bounds& box : boxesOfMedia(scene, 1, mediumWithoutEnd(scene))) near_.extend(box);
+    radius2_ = near_.empty() ? 0 : lengthSquared(near_.extent()) / 4;
   }
   float at(Vec3 p) const {
     const Vec3 beyond = max(max(near_.lo - p, p - near_.hi), Vec3(0.f));
@@ -53,12 +55,10 @@ class Nearness {
 
  private:
   Bounds near_;
-  float radius2_;
+  float radius2_;  ///< 0: nothing is known to be near
 };
 
-OfKind lightsOf(const Scene& scene, const VirtualLights& all, VertexKind kind) {
-  const SceneView& view = scene.view;
-  const Nearness nearness(scene);
+OfKind lightsOf(const SceneView& view, const VirtualLights& all, const Nearness& nearness, VertexKind kind) {
   OfKind found;
   for (size_t walk = 0; walk + 1 < all.firstOf.size(); ++walk)
     for (size_t i = all.firstOf[walk]; i < all.firstOf[walk + 1]; ++i) {
@@ -152,8 +152,9 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
                          const std::stop_token& stop)
     : virtualLights_(std::move(lights)) {
   const SceneView& view = scene.view;
-  const OfKind onSurfaces = lightsOf(scene, virtualLights_, VertexKind::surface),
-               inMedia = lightsOf(scene, virtualLights_, VertexKind::medium);
+  const Nearness nearness(scene);
+  const OfKind onSurfaces = lightsOf(view, virtualLights_, nearness, VertexKind::surface),
+               inMedia = lightsOf(view, virtualLights_, nearness, VertexKind::medium);
   const auto most = static_cast<size_t>(options.most);
   const size_t surfaceShare = std::max(std::max<size_t>(1, most / 2), most - std::min(most, inMedia.lights.size()));
   lights_ = chosenOf(onSurfaces, kept.onSurfaces, surfaceShare, options.turn);
@@ -175,7 +176,7 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   std::vector<Vec3> places;
   for (const Light& l : lights_) places.push_back(aside(l, view));
   between_ = MediaBetween(scene, std::move(places), {}, stop);
-  if (!options.balls || stop.stop_requested()) return;
+  if (!options.balls || !options.fitted || stop.stop_requested()) return;
   const int endless = endlessMedium(scene);
   parallelFor(static_cast<int64_t>(lights_.size() - onSurface), 16, [&](int64_t n) {
     const size_t i = onSurface + static_cast<size_t>(n);

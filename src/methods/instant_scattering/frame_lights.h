@@ -20,9 +20,10 @@ class FrameLights {
     int most = 1300;  ///< lights that are kept, half of them on surfaces where there are enough
     ShadowMapping shadows = ShadowMapping::maps;
     LightMaps::Options maps;
-    bool balls = true;  ///< each has a radius of its own
-    float radius = 1;   ///< of lights that have no neighbours [unit]
-    float turn = 0.5f;  ///< in [0, 1): which ones
+    bool balls = true;   ///< each has a radius of its own
+    bool fitted = true;  ///< and one that keeps its light in the media
+    float radius = 1;    ///< of lights that have no neighbours [unit]
+    float turn = 0.5f;   ///< in [0, 1): which ones
   };
   /// What the lights of a frame leave to those of the next one, if these are of the same walks among the same surfaces.
   struct Kept {

@@ -35,7 +35,8 @@ void FramePixels::visitReceivers(const MarchedEye& eye, Visit&& visit) const {
 
 NearbyNumbers FramePixels::nearbyNumbers(Pixel p, int receiver) const {
   // Coarse pixels of a square of 4 x 4, which the filter spans, look in different directions.
-  const int x = p.x / options_.spacing % 4, y = p.y / options_.spacing % 4;
+  const int x = (p.x + scene_.camera.cropX) / options_.spacing % 4,
+            y = (p.y + scene_.camera.cropY) / options_.spacing % 4;
   const int most = options_.samples + 1;  // receivers of a pixel; the next pass goes on behind them
   const auto n = static_cast<float>((4 * y + x) * most + receiver);
   const auto u = [&](float start, float step) {

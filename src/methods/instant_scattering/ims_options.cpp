@@ -31,6 +31,8 @@ constexpr float kMostAim = 0.95f;
 constexpr float kRadiusShare = 0.3f;
 /// Each leaves some lights of 64 bytes.
 constexpr int kMostWalks = 1 << 22;
+/// Of coarse pixels: farther apart than pictures are wide.
+constexpr int kMostSpacing = 1 << 14;
 /// Of a frame, whose thousand lights share smaller maps' memory.
 constexpr int kFramePoints = 4, kFrameMapResolution = 32, kFrameMapPoints = 0;
 /// Virtual lights for a vertex: where a medium is heterogeneous the way to each must be tracked, and paths are cheaper.
@@ -117,7 +119,7 @@ ImsSettings::ImsSettings(const Settings& settings) {
   const SettingsReader reader(settings, kImsSettings, "ims");
   ImsOptions& o = given_;
   o.mode = static_cast<ImsOptions::Mode>(reader.choice("mode", kMode).value_or(0));
-  o.spacing = reader.integer("spacing", 1).value_or(o.spacing);
+  o.spacing = reader.integer("spacing", 1, kMostSpacing).value_or(o.spacing);
   readMarching(reader);
   walks_ = reader.integer("walks", 1, kMostWalks, "ask for more passes instead: each has walks of its own");
   o.flights = static_cast<FlightMode>(reader.choice("walk_flights", kFlights).value_or(0));

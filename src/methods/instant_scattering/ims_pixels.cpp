@@ -26,7 +26,8 @@ void ImsPixels::lightSmoke(EyeBlock& block, std::span<Sampler> samplers) const {
   constexpr int kPoints = RandomNumbers::kPlaces;
   for (int k = 0; k < kPoints; ++k) {
     alignas(64) float place[EyeBlock::kSize];
-    for (size_t i = 0; i < EyeBlock::kSize; ++i) place[i] = (static_cast<float>(k) + shift[i]) / kPoints;
+    for (size_t i = 0; i < EyeBlock::kSize; ++i)
+      place[i] = std::fmin((static_cast<float>(k) + shift[i]) / kPoints, 0x1.fffffep-1f);
     EyePoints at;
     placePoints(smoke.eyes(), smoke.depths(), place, at);
     for (size_t i = 0; i < block.count; ++i) {

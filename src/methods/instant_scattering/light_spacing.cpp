@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/error.h"
 #include "core/octahedral.h"
 #include "core/parallel.h"
 
@@ -112,7 +113,10 @@ struct LightWithin {
     const float t = 1 - u * u;
     point += met, edge += met * u * u * (1 + t), core += met * square(u * t);
   }
-  float neededCore() const { return core > 0 ? (point - edge) / core : NearField::kPlainCore; }
+  float neededCore() const {
+    constexpr float kHardlyAny = 1e-4f;  // rounding would decide
+    return core > kHardlyAny ? std::fmax(0.f, (point - edge) / core) : NearField::kPlainCore;
+  }
 };
 
 /// What a light's table says in a few directions all around, linear between its nodes, as the kernels' loop reads it.
@@ -178,6 +182,7 @@ class DepthsAround {
 LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore) {
   constexpr int kMostTries = 6;
   constexpr float kSmaller = 0.85f;
+  VIRGA_ASSERT(!media.empty());
   std::vector<DepthsAround> channels;
   for (const DepthTable& table : media) channels.emplace_back(table, light);
   for (int n = 0;; ++n, radius *= kSmaller) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "methods/instant_scattering/upsampling.h"
 #include "transport/media_bounds.h"
 
 namespace virga {
@@ -34,7 +35,6 @@ std::pair<int, int> touched(float lo, float hi, int size) {
 }  // namespace
 
 void setSmallMediaApart(const Scene& scene, int spacing, int width, int height, std::span<PixelFeatures> features) {
-  constexpr float kFaint = 2e-3f;
   const float small = kSmallCells * square(static_cast<float>(spacing));
   for (const Bounds& box : boxesOfMedia(scene, kMostParts)) {
     const std::optional<Bounds> shown = pixelsOf(scene.camera, box);
@@ -44,7 +44,7 @@ void setSmallMediaApart(const Scene& scene, int spacing, int width, int height, 
     for (int y = y0; y < y1; ++y)
       for (int x = x0; x < x1; ++x) {
         PixelFeatures& f = features[static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)];
-        if (maxComponent(f.opacity) > kFaint) f.regular = false;
+        if (maxComponent(f.opacity) > Upsampling::kFaint) f.regular = false;
       }
   }
 }

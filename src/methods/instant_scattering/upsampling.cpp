@@ -8,8 +8,6 @@ namespace {
 
 /// A pixel of which the filter knows less than this is computed itself.
 constexpr float kLeastAgreement = 0.02f;
-/// What is seen by less than this share needs no care.
-constexpr float kFaint = 2e-3f;
 
 /// Cubic B-spline at the four knots around the place t in [0, 1) between the middle two.
 std::array<float, 4> spline(float t) {
@@ -93,8 +91,8 @@ std::vector<Upsampling::Pixel> Upsampling::joined(const std::vector<std::vector<
 
 bool Upsampling::needsOwn(const PixelFeatures& f, float surfaceSum, float mediaSum) const {
   if (!f.regular) return true;
-  return (maxComponent(f.surface) > kFaint && surfaceSum < kLeastAgreement) ||
-         (maxComponent(f.opacity) > kFaint && mediaSum < kLeastAgreement);
+  return (maxComponent(f.surface) > Upsampling::kFaint && surfaceSum < kLeastAgreement) ||
+         (maxComponent(f.opacity) > Upsampling::kFaint && mediaSum < kLeastAgreement);
 }
 
 Upsampling::PixelBlock Upsampling::blockOf(int64_t n) const {

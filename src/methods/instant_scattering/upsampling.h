@@ -44,6 +44,9 @@ class CoarseAxis {
 /// exactly (reflectance and transmittance; opacity): the filter works on the light without it.
 class Upsampling {
  public:
+  /// What is seen by less than this share needs no care.
+  static constexpr float kFaint = 2e-3f;
+
   struct Pixel {
     int x, y;
   };
