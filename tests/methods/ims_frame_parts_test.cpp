@@ -60,7 +60,7 @@ struct TableAround {
 /// Of an isotropic light there, at most 1 wide.
 LightBall ballAround(float sigmaT, float end) {
   const TableAround around(sigmaT, end);
-  return ballWithin({&around.table, 1}, {0, 0, 0, 0, 0, 1, 1, 1, 1, 0}, 1, coreFor(6));
+  return ballWithin({&around.table, 1}, {0, 0, 0, 0, 0, 1, 1, 1, 1, 0}, 1, 0.4f, coreFor(6));
 }
 
 // In a medium without end it is the core that is known; where the medium ends, what lies beyond counts for nothing.
@@ -87,7 +87,7 @@ TEST(FrameLights, BallsKeepTheirLightInTheMedium) {
   }
   // The densest of three channels says how large the ball is; each has its own core.
   const TableAround thin(1, 4), middle(2, 4), dense(5, 4);
-  const LightBall ball = ballWithin(std::vector{thin.table, middle.table, dense.table}, {}, 1, coreFor(6));
+  const LightBall ball = ballWithin(std::vector{thin.table, middle.table, dense.table}, {}, 1, 0.4f, coreFor(6));
   EXPECT_EQ(ball.radius, 1);
   EXPECT_FLOAT_EQ(ball.core.r, ballAround(1, 4).core.r);
   EXPECT_FLOAT_EQ(ball.core.b, ballAround(5, 4).core.r);

@@ -115,8 +115,24 @@ void spread(std::span<FrameLights::Light> lights, VertexKind kind, float otherwi
   for (size_t i = 0; i < lights.size(); ++i) lights[i].radius = radii[i] > 0 ? radii[i] : otherwise;
 }
 
-/// Fits a light's ball to the media that it lies in: point number i of `between`.
-void fitToMedia(const Scene& scene, int endless, const MediaBetween& between, size_t i, FrameLights::Light& light) {
+/// How much smaller balls may be made to keep their light in the media, by how many walks the lights are of: those of
+/// one walk are heavy or light together, and where few walks reach the smoke it is noisy enough.
+float leastBall(const VirtualLights& all, std::span<const FrameLights::Light> lights) {
+  constexpr float kLeast = 0.44f;  // measured: docs/decisions/ims-frame-balls.md
+  constexpr float kManyWalks = 400;
+  std::vector<std::ptrdiff_t> walks;
+  for (const FrameLights::Light& l : lights) {
+    const auto number = static_cast<uint32_t>(l.vertex - all.lights.data());
+    walks.push_back(std::upper_bound(all.firstOf.begin(), all.firstOf.end(), number) - all.firstOf.begin());
+  }
+  std::sort(walks.begin(), walks.end());
+  const auto different = std::unique(walks.begin(), walks.end()) - walks.begin();
+  return 1 - (1 - kLeast) * std::min(1.f, static_cast<float>(different) / kManyWalks);
+}
+
+/// Fits a light's ball to the media that it lies in, down to `least` of its radius: point number i of `between`.
+void fitToMedia(const Scene& scene, int endless, const MediaBetween& between, size_t i, float least,
+                FrameLights::Light& light) {
   const LightVertex& v = *light.vertex;
   const size_t part = between.partAround(i);
   const Rgb depth = sigmaTAround(scene, endless, v) * light.radius;
@@ -130,8 +146,8 @@ void fitToMedia(const Scene& scene, int endless, const MediaBetween& between, si
   static const float kMostCore = coreFor(kDeepest);
   const DepthTable tables[3] = {between.table(i, part, 0), between.table(i, part, between.grey() ? 0 : 1),
                                 between.table(i, part, between.grey() ? 0 : 2)};
-  const LightBall ball =
-      ballWithin(std::span(tables).first(between.grey() ? 1 : 3), light.kernel, light.radius, kMostCore);
+  const LightBall ball = ballWithin(std::span(tables).first(between.grey() ? 1 : 3), light.kernel, light.radius,
+                                    least * light.radius, kMostCore);
   light.radius = ball.radius, light.core = ball.core;
 }
 
@@ -178,9 +194,10 @@ FrameLights::FrameLights(const Scene& scene, VirtualLights lights, const Options
   between_ = MediaBetween(scene, std::move(places), {}, stop);
   if (!options.balls || !options.fitted || stop.stop_requested()) return;
   const int endless = endlessMedium(scene);
+  const float least = leastBall(virtualLights_, std::span(lights_).subspan(onSurface));
   parallelFor(static_cast<int64_t>(lights_.size() - onSurface), 16, [&](int64_t n) {
     const size_t i = onSurface + static_cast<size_t>(n);
-    fitToMedia(scene, endless, between_, i, lights_[i]);
+    fitToMedia(scene, endless, between_, i, least, lights_[i]);
   });
 }
 

@@ -179,19 +179,19 @@ class DepthsAround {
 
 }  // namespace
 
-LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore) {
-  constexpr int kMostTries = 6;
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float least,
+                     float mostCore) {
   constexpr float kSmaller = 0.85f;
   VIRGA_ASSERT(!media.empty());
   std::vector<DepthsAround> channels;
   for (const DepthTable& table : media) channels.emplace_back(table, light);
-  for (int n = 0;; ++n, radius *= kSmaller) {
+  for (;; radius = std::max(least, radius * kSmaller)) {
     float core[3], most = 0;
     for (size_t c = 0; c < 3; ++c) {
       core[c] = c < channels.size() ? channels[c].within(radius).neededCore() : core[0];
       most = std::max(most, core[c]);
     }
-    if (most > mostCore && n + 1 < kMostTries) continue;
+    if (most > mostCore && radius > least) continue;
     return {radius, {std::min(core[0], mostCore), std::min(core[1], mostCore), std::min(core[2], mostCore)}};
   }
 }

@@ -30,10 +30,12 @@ struct LightBall {
   KernelRgb core;
 };
 
-/// The ball of a light in a medium, at most as wide as `radius`, that sends as much light to the media within it as its
-/// middle would. A ball that would have to be brighter in its middle than `mostCore` for that, because it is wider than
-/// the smoke that it lies in or many mean free paths deep, is made smaller. `media`: optical depths all around the
-/// light (DepthView::stretch is 1), of each channel or one for all. The light's own directions are those of its g.
-LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float mostCore);
+/// The ball of a light in a medium, between `least` and all of `radius` wide, that sends as much light to the media
+/// within it as its middle would. A ball that would have to be brighter in its middle than `mostCore` for that, because
+/// it is wider than the smoke that it lies in or many mean free paths deep, is made smaller, down to `least`. `media`:
+/// optical depths all around the light (DepthView::stretch is 1), of each channel or one for all. The light's own
+/// directions are those of its g.
+LightBall ballWithin(std::span<const DepthTable> media, const KernelLight& light, float radius, float least,
+                     float mostCore);
 
 }  // namespace virga
